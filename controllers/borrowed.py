@@ -41,7 +41,7 @@ class _Borrow(Protocol):
     def __call__(self, value: _Value) -> _Value: ...
 
 
-borrowed = cast(_Borrow, _borrow)
+without_refcount = cast(_Borrow, _borrow)
 """An array, or a tuple that contains arrays, without reference counting; for compiled code only.
 
 The original must outlive every use: compiled code may neither return nor store a borrowed array. It must be passed on

@@ -21,7 +21,7 @@ _KIND_NAMES: dict[object, str] = {bool: "True or False", str: "text", types.None
 
 def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bool = False) -> float:
     """Return a gain or length as a float if it is at least `least` and finite (or infinite if allowed); else raise."""
-    of_kind(name, value, float)
+    check_kind(name, value, float)
     number = float(value)
     if np.isnan(number) or number < least or (np.isinf(number) and not infinite):
         raise ParameterError(
@@ -30,7 +30,7 @@ def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bo
     return number
 
 
-def check_kinds(part: object) -> None:
+def check_field_types(part: object) -> None:
     """Raise if the value of a dataclass field is not of the type of its annotation.
 
     Raises
@@ -39,7 +39,7 @@ def check_kinds(part: object) -> None:
         The message names the field, its value, and the type expected.
     """
     for name, kind in _field_kinds(type(part)).items():
-        of_kind(name, getattr(part, name), kind)
+        check_kind(name, getattr(part, name), kind)
 
 
 @cache
@@ -48,7 +48,7 @@ def _field_kinds(part: type) -> dict[str, object]:
     return {field.name: hints[field.name] for field in fields(cast(Any, part))}
 
 
-def of_kind(name: str, value: object, kind: object) -> None:
+def check_kind(name: str, value: object, kind: object) -> None:
     """Raise if a value is not of a kind: a class, a number, one of several words, a sequence of a kind, or a union.
 
     A bool is not a number, and a class is not an instance of itself. Annotations that are not classes (arrays,
@@ -63,7 +63,7 @@ def of_kind(name: str, value: object, kind: object) -> None:
         raise ParameterError(f"{name} is {reprlib.repr(value)}; expected {_kind_in_words(kind)}")
 
 
-def takes(name: str, function: object, *arguments: str) -> None:
+def check_callable(name: str, function: object, *arguments: str) -> None:
     """Raise if an object is not callable, or cannot be called with these arguments; it is not called here.
 
     Raises

@@ -60,14 +60,14 @@ _announced_kernels: list[tuple[Any, tuple[types.Type, ...]]] = []
 _listeners: list[_KernelListener] = []
 
 
-def announce(kernel: Any, arguments: tuple[types.Type, ...]) -> None:
+def register_kernel(kernel: Any, arguments: tuple[types.Type, ...]) -> None:
     """Notify all listeners of a kernel (an ``njit`` function) and its argument types, before it is compiled."""
     _announced_kernels.append((kernel, arguments))
     for listener in _listeners:
         listener(kernel, arguments)
 
 
-def add_keeper(keeper: _KernelListener) -> _KernelListener:
+def add_kernel_listener(keeper: _KernelListener) -> _KernelListener:
     """Notify a function of every kernel, past and future; `sim.compilation` so caches the code of laws and maps."""
     _listeners.append(keeper)
     for kernel, arguments in _announced_kernels:
@@ -78,7 +78,7 @@ def add_keeper(keeper: _KernelListener) -> _KernelListener:
 @cache
 def address_of(kernel: Any, arguments: tuple[types.Type, ...]) -> int:
     """Address of a kernel (an ``njit`` function) after compiling it in this process for these types; kept alive."""
-    announce(kernel, arguments)
+    register_kernel(kernel, arguments)
     kernel.compile(arguments)
     compiled = kernel.get_compile_result(types.void(*arguments))
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))

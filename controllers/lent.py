@@ -87,6 +87,6 @@ class _Lend(Protocol):
     def __call__(self, value: _Tuple) -> _Tuple: ...
 
 
-lend = cast(_Lend, _lend)
+by_pointer = cast(_Lend, _lend)
 """Lend a named tuple to functions that compiled code calls: valid as long as the caller runs and keeps the tuple.
 A tuple that is already lent is passed on unchanged."""

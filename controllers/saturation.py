@@ -14,7 +14,7 @@ from controllers.state import Array
 
 
 @njit
-def clamped(x: float, low: float, high: float, margin: float) -> tuple[float, float]:
+def soft_clamp(x: float, low: float, high: float, margin: float) -> tuple[float, float]:
     """A coordinate saturated at an interval, and its derivative: x within, constant from a margin beyond; C²."""
     beyond = max(x - high, low - x)
     if beyond <= 0.0:
@@ -33,7 +33,7 @@ def saturate_vector(v: Array, inner: float, outer: float, slope: Array) -> None:
     """
     length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     # With a margin of twice the width, the largest length is `outer`.
-    value, rate = clamped(length, 0.0, inner, 2.0 * (outer - inner))
+    value, rate = soft_clamp(length, 0.0, inner, 2.0 * (outer - inner))
     share = value / length if length > inner else 1.0
     square = max(length * length, 1e-300)
     for i in range(3):

@@ -29,7 +29,7 @@ HAND_SIZE = 15
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """Orientation of the upright stylus, wxyz: its axes are parallel to those of H."""
-LONGEST_STEP = 0.05
+MAX_TIME_STEP = 0.05
 """Largest time step by which states driven by the hand's clock advance [s], so that they do not jump after a pause."""
 
 # Slices of the vector for use outside compiled code; a haptic map's argument is the stylus pose.

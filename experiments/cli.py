@@ -23,7 +23,7 @@ import tyro
 
 from controllers.errors import ControllerError, ParameterError
 from experiments import commands
-from experiments.config.keywords import in_options
+from experiments.config.keywords import option_message
 from models.errors import ModelError
 from sim.errors import SimError
 
@@ -67,7 +67,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 0
     command: Any = None
     try:
-        command = parsed(words)
+        command = parse_command(words)
         if signal.getsignal(signal.SIGINT) is startup.stop_early:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         import mujoco  # imported late: help and error messages do not need it
@@ -78,7 +78,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError:
         raise
     except (ModelError, ControllerError, SimError) as error:
-        print(f"hvf: {in_options(error)}", file=sys.stderr)
+        print(f"hvf: {option_message(error)}", file=sys.stderr)
         return 2
     except OSError as error:
         print(f"hvf: {_system_error_message(error)}", file=sys.stderr)
@@ -119,12 +119,12 @@ def command_class(name: str) -> Any:
     return import_module(f"experiments.commands.{name}").Command
 
 
-def choice_of(names: Sequence[str]) -> Any:
+def command_union(names: Sequence[str]) -> Any:
     """Union type from which tyro parses one of these commands."""
     return reduce(or_, (Annotated[command_class(name), tyro.conf.subcommand(name)] for name in names))
 
 
-def parsed(words: Sequence[str]) -> Any:
+def parse_command(words: Sequence[str]) -> Any:
     """The command that these words of the command line ask for.
 
     Raises
@@ -137,7 +137,7 @@ def parsed(words: Sequence[str]) -> Any:
     errors = io.StringIO()
     command = words[0] if words and words[0] in commands.NAMES else None
     # If a command is named, the options of the others are not imported.
-    prog, rest, choice = ("hvf", words, choice_of(commands.NAMES)) if command is None else (
+    prog, rest, choice = ("hvf", words, command_union(commands.NAMES)) if command is None else (
         f"hvf {command}", words[1:], command_class(command)
     )  # fmt: skip
     try:

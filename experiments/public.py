@@ -4,9 +4,9 @@ import warnings
 from importlib.metadata import version as installed
 from pathlib import Path
 
-from controllers.checks import checked, of_kind
+from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
-from experiments.config.keywords import in_keywords, keywords
+from experiments.config.keywords import to_keywords, with_keyword_messages
 from experiments.files.given_path import given_path
 from experiments.lifting.lift_file import lift_into
 from experiments.preparation.command import prepare_file
@@ -26,7 +26,7 @@ def clips(*names: str) -> tuple[Clip, ...]:
     return tuple(embedded(name) for name in names or embedded_names())
 
 
-@in_keywords()
+@with_keyword_messages()
 def load(path: str | Path, raw: bool = False) -> Clip:
     """The motion in a BVH, AMC or DeepMimic file on the figure, prepared once as by ``hvf prepare``.
 
@@ -44,15 +44,15 @@ def load(path: str | Path, raw: bool = False) -> Clip:
     ModelError
         If the file cannot be read, or its skeleton is not a human's.
     """
-    of_kind("raw", raw, bool)
+    check_kind("raw", raw, bool)
     found = prepared_clips([given_path("path", path)], raw)[0]
     if not found.feasible:
-        warnings.warn(keywords(found.remarks[-1]), stacklevel=3)
+        warnings.warn(to_keywords(found.remarks[-1]), stacklevel=3)
     return found.clip
 
 
-lift = in_keywords()(lift_into)
-prepare = in_keywords()(prepare_file)
+lift = with_keyword_messages()(lift_into)
+prepare = with_keyword_messages()(prepare_file)
 
 
 def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:

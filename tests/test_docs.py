@@ -12,7 +12,7 @@ from types import ModuleType
 import matplotlib.pyplot as plt
 import pytest
 
-from experiments.cli import parsed
+from experiments.cli import parse_command
 from experiments.commands import NAMES
 from experiments.config.words import config_of_options
 from experiments.trials.study import Study
@@ -96,7 +96,7 @@ def _parses(arguments: list[str], line: str) -> None:
         return
     if len(arguments) == 1 and arguments[0] in NAMES:
         return  # the command's name, without what it needs
-    command = parsed(arguments)
+    command = parse_command(arguments)
     assert callable(command), line
     options = getattr(command, "options", None)
     if options is not None and options.config is None:  # files of earlier runs do not exist here

@@ -5,18 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.legs.limb_ends import SHARP, end_poses, lowest_point
+from controllers.legs.limb_ends import SOFTMIN_WIDTH, end_poses, lowest_point
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.motion.time_warping import least_cost_lead, smooth_lead
 from controllers.state import Array, IntArray
 
-LARGEST_LEAD = 0.125  # largest lead or lag of a warp, as a fraction of the lap
+MAX_LEAD = 0.125  # largest lead or lag of a warp, as a fraction of the lap
 
 # Samples of a lap. In four sets of embedded clips, half as many change joint angles by 1 to 2° RMS, twice as many by
 # at most 0.8°.
 _SAMPLES = 128
-_MAX_LEAD = int(LARGEST_LEAD * _SAMPLES)
+_MAX_LEAD = int(MAX_LEAD * _SAMPLES)
 _MAX_PACE_CHANGE = 0.25  # largest change of the pace by a warp
 # Weight of stance relative to rotations: a blend of cheer and ginga slides 1.0 cm, also with half of it; twice: 0.7.
 _STANCE_WEIGHT = 2.0
@@ -45,7 +45,7 @@ def _features(loop: Loop, limbs: Sequence[Limb]) -> Array:
 def _stance_degree(channels: Array, drift: Array, limb: Limb) -> Array:
     """Degree from 0 to 1 to which an end is in stance (low, and slow over the ground); shape (samples,)."""
     place, quaternions = (part[:, 0] for part in end_poses(channels[:, None], limb))
-    height = place[:, 2] + lowest_point(quaternions, limb, SHARP)
+    height = place[:, 2] + lowest_point(quaternions, limb, SOFTMIN_WIDTH)
     ahead, behind = (np.roll(place, shift, axis=0) for shift in (-1, 1))
     across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
     # The velocity over the ground is that of the drift plus that in the frame of the drift.

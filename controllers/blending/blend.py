@@ -15,7 +15,7 @@ from controllers.blending.combination import (
     figure_size,
     packed_figure,
 )
-from controllers.borrowed import borrowed
+from controllers.borrowed import without_refcount
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -73,7 +73,7 @@ def blend_corrected(params: Array, angle: float, mixture: Mixture, memory: Array
     channels = figure_channels(figure)
     value, slope = work_array((clips, channels)), work_array((clips, channels))
     rows = figure[figure_size(figure) :]
-    _interpolate(borrowed(rows), samples, clips, angle, value, slope)
+    _interpolate(without_refcount(rows), samples, clips, angle, value, slope)
     ground = Ground(memory[:0], work_array((0, 0, 3)), 0.0, 0.0)
     combine(figure, ClipsAt(value, slope, drifts), angle, mixture, memory, ground, pose, jacobian)
 

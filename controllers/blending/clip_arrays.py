@@ -30,7 +30,7 @@ def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limb
     return arrays
 
 
-def kept(arrays: Mapping[str, Array], key: str, shape: tuple[int | None, ...]) -> Array:
+def stored_array(arrays: Mapping[str, Array], key: str, shape: tuple[int | None, ...]) -> Array:
     """Stored array of a key, as floats of a given shape, in which None stands for any length.
 
     Raises
@@ -49,12 +49,12 @@ def kept(arrays: Mapping[str, Array], key: str, shape: tuple[int | None, ...]) -
     return array
 
 
-def kept_names(arrays: Mapping[str, Array]) -> tuple[str, ...]:
+def stored_names(arrays: Mapping[str, Array]) -> tuple[str, ...]:
     """Names of the clips, in their order."""
     return tuple(dict.fromkeys(key[5:].rpartition("/")[0] for key in arrays if key.startswith("clip/")))
 
 
-def kept_clips(arrays: Mapping[str, Array]) -> list[tuple[Array, float]]:
+def stored_clips(arrays: Mapping[str, Array]) -> list[tuple[Array, float]]:
     """Clips restored from the output of `clip_arrays`.
 
     Raises
@@ -63,21 +63,27 @@ def kept_clips(arrays: Mapping[str, Array]) -> list[tuple[Array, float]]:
         If an array is missing or has another shape.
     """
     return [
-        (kept(arrays, f"clip/{name}/poses", (None, None)), float(kept(arrays, f"clip/{name}/fps", (1,))[0]))
-        for name in kept_names(arrays)
+        (
+            stored_array(arrays, f"clip/{name}/poses", (None, None)),
+            float(stored_array(arrays, f"clip/{name}/fps", (1,))[0]),
+        )
+        for name in stored_names(arrays)
     ]
 
 
-def kept_limbs(arrays: Mapping[str, Array]) -> list[Limb]:
-    """Limbs restored from the output of `clip_arrays`; raises as `kept_clips` and `Limb` do."""
+def stored_limbs(arrays: Mapping[str, Array]) -> list[Limb]:
+    """Limbs restored from the output of `clip_arrays`; raises as `stored_clips` and `Limb` do."""
     limbs: list[Limb] = []
     while any(key.startswith(f"limb/{len(limbs)}/") for key in arrays):
         key = f"limb/{len(limbs)}/"
-        joints = kept(arrays, f"{key}joints", (3,))
+        joints = stored_array(arrays, f"{key}joints", (3,))
         if not np.isfinite(joints).all():
             raise ParameterError(f"'{key}joints' of the map must be finite, got {joints}")
         first, second, last = (int(joint) for joint in joints)
-        offsets, axis = kept(arrays, f"{key}offsets", (3, 3)), kept(arrays, f"{key}axis", (3,))
-        points, limits = kept(arrays, f"{key}points", (None, 3)), kept(arrays, f"{key}limits", (3, 3, 2))
+        offsets, axis = stored_array(arrays, f"{key}offsets", (3, 3)), stored_array(arrays, f"{key}axis", (3,))
+        points, limits = (
+            stored_array(arrays, f"{key}points", (None, 3)),
+            stored_array(arrays, f"{key}limits", (3, 3, 2)),
+        )
         limbs.append(Limb((first, second, last), offsets, axis, points, limits))
     return limbs

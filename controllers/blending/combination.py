@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.borrowed import borrowed
+from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
-from controllers.legs.footing import go_on, keep_footing, mixed
-from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
+from controllers.legs.footing import advance_hand, hold_stance_foot, mixing_degree
+from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation
@@ -31,7 +31,7 @@ _PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weight
 @njit
 def figure_size(figure: Array) -> int:
     """Length of the `packed_figure` at the start of an array."""
-    return _GROUPS + int(figure[_ROTATIONS]) + LIMB * int(figure[_LIMBS])
+    return _GROUPS + int(figure[_ROTATIONS]) + LIMB_SIZE * int(figure[_LIMBS])
 
 
 @njit
@@ -43,7 +43,7 @@ def figure_limbs(figure: Array) -> int:
 @njit
 def figure_channels(figure: Array) -> int:
     """Channels of a clip: root position, rotations, ends of limbs."""
-    return 3 + 4 * int(figure[_ROTATIONS]) + END * int(figure[_LIMBS])
+    return 3 + 4 * int(figure[_ROTATIONS]) + N_END_CHANNELS * int(figure[_LIMBS])
 
 
 @njit(forceinline=True)
@@ -206,8 +206,8 @@ def combine(
         Written.
     """
     _combine_borrowed(
-        borrowed(figure), borrowed(clips), angle, borrowed(mixture), borrowed(memory), borrowed(ground), borrowed(pose),
-        borrowed(jacobian),
+        without_refcount(figure), without_refcount(clips), angle, without_refcount(mixture), without_refcount(memory),
+        without_refcount(ground), without_refcount(pose), without_refcount(jacobian),
     )  # fmt: skip
 
 
@@ -237,7 +237,7 @@ def _combine_borrowed(
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
         frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
         frame[2] = s * drift[0, 2] + lap
-        ahead, mixing = go_on(footing, angle), mixed(weights[0])
+        ahead, mixing = advance_hand(footing, angle), mixing_degree(weights[0])
 
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
@@ -248,8 +248,8 @@ def _combine_borrowed(
             root[k, 0] += correction[k, 0]
             root[k, 1] += correction[k, 1]
     for n in range(limbs):
-        limb = packed[LIMB * n : LIMB * (n + 1)]
-        last, column = int(limb[LAST]), 3 + 4 * rotations + END * n
+        limb = packed[LIMB_SIZE * n : LIMB_SIZE * (n + 1)]
+        last, column = int(limb[LAST]), 3 + 4 * rotations + N_END_CHANNELS * n
         _mean_position(value, slope, column, weights[0], changes[0], end)
         heading = 0.0
         if corrected:
@@ -265,8 +265,8 @@ def _combine_borrowed(
         if soles.shape[0] > 0:
             keep_above(floor, soles[n], end, q[last], rates[last], tangents)
         if footing.shape[0] > 0:
-            keep_footing(footing, n, ahead, mixing, soles[n], contact, frame, end[0], q[last])
-        place_limb(limb, q, rates, root, end, tangents)
+            hold_stance_foot(footing, n, ahead, mixing, soles[n], contact, frame, end[0], q[last])
+        solve_limb(limb, q, rates, root, end, tangents)
 
     x, y = drift_motion(drift, s, 1.0, shift, turn)
     _turn_position(s * drift[0, 2], turn, x, y, shift, root)

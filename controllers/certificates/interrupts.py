@@ -8,7 +8,7 @@ from types import FrameType
 
 
 @contextmanager
-def heeding_interrupts() -> Generator[None]:
+def raise_lost_interrupts() -> Generator[None]:
     """Raise, at the end of the block, a KeyboardInterrupt that was lost within it.
 
     CasADi checks for signals while it evaluates, and throws. IPOPT stops then, but reports an ordinary failure to find

@@ -64,7 +64,7 @@ class Verdict:
             raise CertificateError(f"a counterexample goes with what is refuted, and only with it; {self.reason}")
 
 
-def leaving_out(verdict: Verdict, laws: Sequence[str]) -> Verdict:
+def without_laws(verdict: Verdict, laws: Sequence[str]) -> Verdict:
     """Verdict on a whole program, from the verdict on the program without some `laws`: certified becomes unknown.
 
     Refuted stays refuted, under the assumption that the omitted laws give no force there.

@@ -11,7 +11,7 @@ AXIS = 1e-3  # [m] nearer to the axis, derivatives are evaluated at this distanc
 
 
 @njit
-def eased(s: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
+def eased_weight(s: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
     """Blend weight u(s) and u': 0 below 0, 1 above 1, linear between except for eased edges; C²."""
     if s <= 0.0:
         return 0.0, 0.0
@@ -29,7 +29,7 @@ def eased(s: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
 @njit
 def blend_weight(x: float, low: float, high: float, margin: float = _EASING_FRACTION) -> tuple[float, float]:
     """Weight u of the upper end of an interval, 1 − u being that of the lower end, and its derivative by x."""
-    u, slope = eased((x - low) / (high - low), margin)
+    u, slope = eased_weight((x - low) / (high - low), margin)
     return u, slope / (high - low)
 
 

@@ -170,7 +170,7 @@ def _copy_pieces(record: Array, at: int, source: int, target: int) -> None:
 
 
 @njit
-def let_go(record: Array, at: int) -> None:
+def discard_edit(record: Array, at: int) -> None:
     """Discard the pending edit: the curve is restored, bit for bit, to the state after the committed edits."""
     curve = work_curve(record, at)
     rows = curve + int(record[curve + COEFFICIENTS])
@@ -179,7 +179,7 @@ def let_go(record: Array, at: int) -> None:
 
 
 @njit
-def take_hold(record: Array, at: int, phase: float) -> bool:
+def begin_edit(record: Array, at: int, phase: float) -> bool:
     """Begin an edit at a phase t_j; returns False if an end of an open curve, which stays fixed, is too near.
 
     The half width is h, or near an end of an open curve the distance to it, but not below h/4.
@@ -203,7 +203,7 @@ def take_hold(record: Array, at: int, phase: float) -> bool:
 
 
 @njit
-def carry_to(record: Array, at: int, x: float, y: float, z: float) -> None:
+def drag_to(record: Array, at: int, x: float, y: float, z: float) -> None:
     """Bend the curve under the bump so that φ′(t_j) is at a given position in H [m]."""
     edit, curve = at + PENDING, work_curve(record, at)
     weight = bump((record[at + PHASE] - record[edit]) / record[edit + 1])
@@ -246,7 +246,7 @@ def _replay(record: Array, at: int, count: int) -> None:
     for edit in range(count):
         _add_bump(record, at, at + int(record[at + TABLE]) + EDIT * edit, committed, committed)
     record[at + COUNT] = count
-    let_go(record, at)
+    discard_edit(record, at)
 
 
 @njit

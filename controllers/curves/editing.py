@@ -12,7 +12,7 @@ from controllers.state import Array
 
 _STEPS_PER_HALF_WIDTH = 16  # grid steps per half width h: the centre of a bump is at most h/32 from the grasped phase
 _MAX_DURATION_RATIO = 10_000  # largest duration of a curve in half widths: 160 000 steps, a hundred megabytes
-MOST_EDITS = 10_000  # largest number of edits that can be undone; each is stored as five numbers
+MAX_EDITS = 10_000  # largest number of edits that can be undone; each is stored as five numbers
 _BREAK_TOLERANCE = 1e-9  # fraction of a grid step: breaks nearer than this coincide
 
 
@@ -28,7 +28,7 @@ def _curve_of_pieces(times: Array, coefficients: Array, like: Trajectory) -> Tra
     return curve
 
 
-def refined(curve: Trajectory, cells: int) -> Trajectory:
+def refine(curve: Trajectory, cells: int) -> Trajectory:
     """The same curve on more pieces: its own breaks, and those of a grid of equal steps over its duration.
 
     Parameters
@@ -67,7 +67,7 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
     ------
     CurveError
         If h is not positive, above half of the curve's duration or below 1/10 000 of it, or `depth` is not from 1 to
-        `MOST_EDITS`.
+        `MAX_EDITS`.
     """
     if not 0.0 < width <= 0.5 * curve.duration:
         raise CurveError(
@@ -78,14 +78,14 @@ def record_of(curve: Trajectory, width: float, depth: int) -> Array:
             f"a curve of {curve.duration:g} s cannot be bent by bumps of a half width of {width:g} s; expected "
             f"{curve.duration / _MAX_DURATION_RATIO:g} s or more"
         )
-    if not 1 <= depth <= MOST_EDITS:
-        raise CurveError(f"from 1 to {MOST_EDITS} edits can be undone, got {depth}")
+    if not 1 <= depth <= MAX_EDITS:
+        raise CurveError(f"from 1 to {MAX_EDITS} edits can be undone, got {depth}")
     steps = np.diff(np.asarray(curve.times, dtype=float))
     # For a curve of equal steps the grid is a refinement of its breaks, so that steps stay equal.
     multiple = len(steps) if np.ptp(steps) <= _BREAK_TOLERANCE * steps[0] else 1
     cells = multiple * int(np.ceil(_STEPS_PER_HALF_WIDTH * curve.duration / (width * multiple)))
     step = curve.duration / cells
-    fine = refined(curve, cells)
+    fine = refine(curve, cells)
     packed, rows = fine.packed(), fine.coefficients.ravel()
     offsets = np.cumsum([RECORD_HEADER, EDIT * depth, len(rows), len(rows)])
     header = np.zeros(RECORD_HEADER)

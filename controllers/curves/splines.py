@@ -45,7 +45,7 @@ def interpolate(rows: Array, stride: int, u: float, rate: float, value: Array, s
         slope[k] = rate * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
 
 
-def round_lap(samples: Array, angles: Array) -> Array:
+def periodic_interpolation(samples: Array, angles: Array) -> Array:
     """Values at angles (...) [rad] of the periodic C² splines through samples (n, ...) at equal steps of the lap."""
     from scipy.interpolate import CubicSpline  # here: a field is evaluated, and a certificate verified, without it
 

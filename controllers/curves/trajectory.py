@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import check_kinds, checked, numbers_of, of_kind
+from controllers.checks import check_field_types, check_kind, checked, numbers_of
 from controllers.curves.bounds import capsule_tree
 from controllers.errors import CurveError
 from controllers.state import Array
@@ -173,7 +173,7 @@ class Trajectory:
         return f"<{kind} curve of {len(points)} samples, {length:.3g} m in {self.duration:.3g} s>"
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         n = numbers_of("times of a curve", self.times).size
         least = 4 if self.periodic else 2
         if n < least:
@@ -235,8 +235,8 @@ class Trajectory:
         """
         checked("radius", radius, "m")
         checked("period", period, "s")
-        of_kind("samples", samples, int)
-        of_kind("wave", wave, float)
+        check_kind("samples", samples, int)
+        check_kind("wave", wave, float)
         middle = numbers_of("centre", centre)
         if middle.shape != (3,):
             raise CurveError(f"the centre of a circle is {middle.tolist()}; expected three numbers")

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
@@ -44,7 +44,7 @@ class RiverBundle(Law):
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if not self.rivers or len(set(self.names)) != len(self.rivers) or len(self.names) != len(self.rivers):
             raise ParameterError(
                 f"a bundle needs rivers, each with a name of its own; got {len(self.rivers)} and the names {self.names}"

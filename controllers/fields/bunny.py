@@ -6,13 +6,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import START, Trajectory, curve_point, curve_velocity, wrap_phase
-from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import follow_force
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, LONGEST_STEP, Array
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, MAX_TIME_STEP, Array
 
 
 @njit
@@ -54,7 +54,7 @@ def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, h
         bunny = phase
     else:
         pace = gaussian(_squared_distance(params, curve, memory[slot + _BUNNY_PHASE], p), gains.inverse_square)
-        bunny = memory[slot + _BUNNY_PHASE] + pace * min(max(time - memory[slot + _LAST_TIME], 0.0), LONGEST_STEP)
+        bunny = memory[slot + _BUNNY_PHASE] + pace * min(max(time - memory[slot + _LAST_TIME], 0.0), MAX_TIME_STEP)
     bunny = wrap_phase(params, curve, bunny)
     memory[slot + _BUNNY_PHASE], memory[slot + _LAST_TIME] = bunny, time
     pull = gaussian(_squared_distance(params, curve, bunny, p), gains.inverse_square)
@@ -63,10 +63,10 @@ def bunny_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, h
     for i in range(3):
         wrench[i] = pull * follow_force(p[i], v[i], p_curve[i], v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
-    leave_trace(params, curve, memory, phase, distance, bunny)
+    write_trace(params, curve, memory, phase, distance, bunny)
 
 
-class FeltBunny(NamedTuple):
+class WeightedGains(NamedTuple):
     """Weighted form of a bunny: k_r [N/m], b_d [N s/m], δ [m]."""
 
     k_r: float
@@ -74,11 +74,11 @@ class FeltBunny(NamedTuple):
     delta: float
 
 
-def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> FeltBunny:
+def felt_bunny(k_r: float, b_d: float, delta: float, attraction: str) -> WeightedGains:
     """Gains of the weighted form that is executed: those given, or for "convolution" its closed form."""
     if attraction != "convolution":
-        return FeltBunny(k_r, b_d, delta)
-    return FeltBunny(k_r * 2.0**-2.5, b_d * 2.0**-1.5, delta * 2.0**0.5)
+        return WeightedGains(k_r, b_d, delta)
+    return WeightedGains(k_r * 2.0**-2.5, b_d * 2.0**-1.5, delta * 2.0**0.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,13 +130,13 @@ class Bunny(Law):
     pace: Literal["clock", "wait"] = "wait"
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("delta", self.delta, "m", least=1e-4, infinite=True)
 
     @property
-    def felt(self) -> FeltBunny:
+    def felt(self) -> WeightedGains:
         """Gains of the weighted form that is executed."""
         return felt_bunny(self.k_r, self.b_d, self.delta, self.attraction)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
@@ -18,7 +18,7 @@ from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
 from controllers.fields.river import River, river_flow
-from controllers.state import HAND_POSITION, HAND_TIME, LONGEST_STEP, Array
+from controllers.state import HAND_POSITION, HAND_TIME, MAX_TIME_STEP, Array
 from controllers.work_array import work_array
 
 _NEAREST, _PERFORMANCE_TIME, _LAST_TIME, _MEMORY_SIZE = range(4)  # t* of φ', s, time of the last tick [s]
@@ -61,7 +61,7 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         s = start
         if not math.isnan(memory[slot + _PERFORMANCE_TIME]):
             s = memory[slot + _PERFORMANCE_TIME]
-            step = min(max(time - memory[slot + _LAST_TIME], 0.0), LONGEST_STEP)
+            step = min(max(time - memory[slot + _LAST_TIME], 0.0), MAX_TIME_STEP)
             s += _performance_window(params, performed, s, inverse_square, p) * step
         # After its end, the performance returns to its start and waits there for the hand.
         s = start if s > end else s
@@ -175,7 +175,7 @@ class Edited(Law):
     pace: Literal["clock", "wait"] = "clock"
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if len(self.weights) != len(self.performed) or not np.isfinite(self.weights).all():
             raise ParameterError(f"{len(self.performed)} performances need as many finite weights, got {self.weights}")
         checked("epsilon", self.epsilon, "m", least=1e-4)

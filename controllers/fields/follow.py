@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
-from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
@@ -21,7 +21,7 @@ def follow_force(p: float, v: float, p_curve: float, v_curve: float, k_r: float,
     return k_r * (p_curve - p) + b_d * (v_curve - v)
 
 
-PACES = (0.5, 1.5)
+PACE_RANGE = (0.5, 1.5)
 """Smallest and largest γ of a parallel flow, reached half a radius of curvature off the curve; bounds its power."""
 
 
@@ -62,7 +62,7 @@ def follow_at(
     w, pace = window(distance * distance * gains.inverse_square), 1.0
     if gains.parallel != 0.0 and v_curve != (0.0, 0.0, 0.0):
         pace = parallel_pace(p, p_curve, v_curve, curve_acceleration(params, curve, phase))
-        pace = min(max(pace, PACES[0]), PACES[1])
+        pace = min(max(pace, PACE_RANGE[0]), PACE_RANGE[1])
     for i in range(3):
         wrench[i] = w * follow_force(p[i], v[i], p_curve[i], pace * v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
@@ -75,7 +75,7 @@ def follow_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, 
     p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
     phase, distance = follow_at(follow_gains(params, at), params, curve, memory[slot], p, v, wrench)
     memory[slot] = phase
-    leave_trace(params, curve, memory, phase, distance, phase)
+    write_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ class Follow(Law):
     parallel: bool = False
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)

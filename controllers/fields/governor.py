@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
-from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
@@ -50,7 +50,7 @@ def governor_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     force *= window(distance * distance * gains.inverse_square) / pace
     wrench[0], wrench[1], wrench[2] = force * x, force * y, force * z
     wrench[3:] = 0.0
-    leave_trace(params, curve, memory, phase, distance, phase)
+    write_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Governor(Law):
     epsilon: float = 0.25
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("drag", self.drag, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
         object.__setattr__(self, "speeds", checked_speeds("governor", self.speeds))

@@ -7,12 +7,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, Trajectory, curve_point, curve_velocity
 from controllers.fields.admissible import admissible_speeds
-from controllers.fields.algebra.instructions import TRACE_RIVER, leave_trace
+from controllers.fields.algebra.instructions import TRACE_RIVER, write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
@@ -240,7 +240,7 @@ def _write_trace(params: Array, at: int, table: Array, count: int, winner: int, 
             phase, distance = table[shown, _PHASE], table[shown, _DISTANCE]
         else:
             phase, distance = closest_phase(params, curve, p[0], p[1], p[2], np.nan)
-        leave_trace(params, curve, memory, phase, distance, phase)
+        write_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +292,7 @@ class HigherOrder(Law):
     look: float = 0.0
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("look", self.look, "s")
         checked("admission", self.admission, "m/s", least=1e-6)
         checked("sigma", self.sigma, "m/s", least=1e-6)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
-from controllers.fields.algebra.instructions import TRACE_SIZE, leave_place
+from controllers.checks import check_field_types, checked
+from controllers.fields.algebra.instructions import TRACE_SIZE, write_trace_point
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.walker_feed import WalkerFeed
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
@@ -79,7 +79,7 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
     wrench[2] = -gains.k_z * p[2] - gains.b * v[2]
     q_x, q_y = (walker.x + walker.beyond * c) / scale, (walker.y + walker.beyond * s) / scale
     distance = np.sqrt((p[0] - q_x) ** 2 + (p[1] - q_y) ** 2 + p[2] ** 2)
-    leave_place(memory, walker.s, (q_x, q_y, 0.0), distance, walker.goal)
+    write_trace_point(memory, walker.s, (q_x, q_y, 0.0), distance, walker.goal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class Leading(Law):
     b: float = 3.0
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         for name, unit in (("k_l", "N/m"), ("k_z", "N/m"), ("b", "N s/m")):
             checked(name, getattr(self, name), unit)
 

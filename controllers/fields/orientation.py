@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra.instructions import leave_trace
+from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.rotations import logarithm, multiply
@@ -40,7 +40,7 @@ def orientation_wrench(
     for i in range(3):
         wrench[i] = 0.0
         wrench[3 + i] = share * (gains.k_o * error[i] + gains.b_o * (spin[i] - w[i]))
-    leave_trace(params, curve, memory, phase, distance, phase)
+    write_trace(params, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Orientation(Law):
     epsilon: float = 0.25
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("k_o", self.k_o, "N m/rad")
         checked("b_o", self.b_o, "N m s/rad")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.errors import ControllerError
@@ -75,7 +75,7 @@ class River(Law):
     speeds: npt.ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
         checked("tau", self.tau, "s", least=1e-4)
         checked("drag", self.drag, "N s/m")

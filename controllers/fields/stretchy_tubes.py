@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.deformation import (
     ANCHOR,
@@ -14,11 +14,11 @@ from controllers.curves.deformation import (
     EDIT,
     PHASE,
     TABLE,
-    carry_to,
+    begin_edit,
     commit,
-    let_go,
+    discard_edit,
+    drag_to,
     redo,
-    take_hold,
     undo,
     work_curve,
 )
@@ -26,7 +26,7 @@ from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
-from controllers.fields.algebra.instructions import TRACE_SIZE, leave_trace
+from controllers.fields.algebra.instructions import TRACE_SIZE, write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import Follow, FollowGains, follow_wrench
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
@@ -74,7 +74,7 @@ def _handle_press(radius: float, memory: Array, slot: int, hand: Array, distance
         memory[slot + _PRESS_POINT + i] = hand[HAND_POSITION + i]
     if distance > radius:
         memory[slot + _MODE] = PROBING
-    elif take_hold(memory, slot + _RECORD, memory[slot + _PHASE]):
+    elif begin_edit(memory, slot + _RECORD, memory[slot + _PHASE]):
         memory[slot + _MODE] = HOLDING
     else:
         memory[slot + _MODE] = IDLE
@@ -87,7 +87,7 @@ def _handle_release(memory: Array, slot: int, time: float) -> None:
     if mode == PUSHING or (mode == HOLDING and memory[slot + _TRAVEL] >= CLICK_DISTANCE):
         commit(memory, record)
     elif mode != PROBING:
-        let_go(memory, record)
+        discard_edit(memory, record)
         if memory[slot + _TRAVEL] < CLICK_DISTANCE:
             if time - memory[slot + _PRESS_TIME] < CLICK_TIME:
                 undo(memory, record)
@@ -100,7 +100,7 @@ def _handle_release(memory: Array, slot: int, time: float) -> None:
 def _start_push(radius: float, memory: Array, slot: int, p: Array, distance: float) -> None:
     """A probe that enters the tube begins to push it, along the normal of the first contact."""
     record = slot + _RECORD
-    if distance < radius and take_hold(memory, record, memory[slot + _PHASE]):
+    if distance < radius and begin_edit(memory, record, memory[slot + _PHASE]):
         memory[slot + _MODE] = PUSHING
         for i in range(3):
             memory[slot + _NORMAL + i] = (p[i] - memory[record + ANCHOR + i]) / max(distance, 1e-9)
@@ -119,9 +119,9 @@ def _push_curve(radius: float, memory: Array, slot: int, p: Array) -> float:
             memory[record + ANCHOR + 1] - depth * memory[slot + _NORMAL + 1],
             memory[record + ANCHOR + 2] - depth * memory[slot + _NORMAL + 2],
         )
-        carry_to(memory, record, x, y, z)
+        drag_to(memory, record, x, y, z)
         return depth
-    let_go(memory, record)
+    discard_edit(memory, record)
     memory[slot + _MODE] = PROBING
     return 0.0
 
@@ -155,7 +155,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         wrench[:3] = np.nan
         return
     if memory[slot + _MODE] == NEW:
-        let_go(memory, record)
+        discard_edit(memory, record)
         memory[slot + _MODE] = SEEKING
     curve, performing = work_curve(memory, record), hand[HAND_TIME] >= gains.until
     pressed = hand[HAND_SWITCH] > 0.5 and not performing
@@ -176,7 +176,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     mode, stiffness = memory[slot + _MODE], 0.0
     target = (p[0], p[1], p[2])
     if mode == HOLDING:
-        carry_to(memory, record, p[0], p[1], p[2])
+        drag_to(memory, record, p[0], p[1], p[2])
         stiffness = gains.stretch
         held = slot + _PRESS_POINT if gains.at_stylus > 0.0 else record + ANCHOR
         target = (memory[held], memory[held + 1], memory[held + 2])
@@ -196,7 +196,7 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         distance = _distance(p, x, y, z)
     if mode == HOLDING:
         memory[slot + _OFFSET] = max(memory[slot + _OFFSET], distance)
-    leave_trace(memory, curve, memory, phase, distance, phase)
+    write_trace(memory, curve, memory, phase, distance, phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +268,7 @@ class StretchyTubes(Law):
     hold: Literal["curve", "stylus"] = "curve"
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked("k_f", self.k_f, "N/m")
         checked("k_s", self.k_s, "N/m")
         checked("b", self.b, "N s/m")

@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from controllers.blending.blend import packed_blend
-from controllers.blending.clip_arrays import kept
+from controllers.blending.clip_arrays import stored_array
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
-from controllers.motion.strides import in_step
+from controllers.motion.strides import fit_to_lap
 from controllers.state import Array
 
 
@@ -97,7 +97,7 @@ class AnimationMap(ClipMap):
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
-        self.loops: list[Loop] = in_step(loops, lap, apart)
+        self.loops: list[Loop] = fit_to_lap(loops, lap, apart)
         self.lap = lap
         limbs = [limb.allowing(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
@@ -126,7 +126,7 @@ class AnimationMap(ClipMap):
         return {} if self.lap is None else {"lap": np.array([self.lap])}
 
 
-def kept_lap(arrays: Mapping[str, Array]) -> float | None:
+def stored_lap(arrays: Mapping[str, Array]) -> float | None:
     """The lap [s] in the output of `lap_array`, or None.
 
     Raises
@@ -136,7 +136,7 @@ def kept_lap(arrays: Mapping[str, Array]) -> float | None:
     """
     if "lap" not in arrays:
         return None
-    lap = float(kept(arrays, "lap", (1,))[0])
+    lap = float(stored_array(arrays, "lap", (1,))[0])
     if not 0.0 < lap < np.inf:
         raise ParameterError(f"'lap' of the map must be positive and finite, got {lap}")
     return lap

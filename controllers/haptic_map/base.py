@@ -11,12 +11,12 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.map_stages import CompiledMap, register
 from controllers.haptic_map.own_map import (
     FIGURE,
-    Asked,
+    PythonCallback,
     check_derivative,
     checked_jacobian,
     checked_pose,
     finite_differences,
-    own_map,
+    python_map,
 )
 from controllers.state import Array, Pose, stylus_path
 
@@ -45,9 +45,9 @@ class HapticMap(ABC):
     derivative is computed by finite differences; a `jacobian` of its own is compared with them before a run.
     """
 
-    map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(own_map)
+    map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(python_map)
     """The kernel of the class (see `controllers.haptic_map.map_stages`); by default one that calls Python."""
-    _asked: ClassVar[Asked | None] = None
+    _asked: ClassVar[PythonCallback | None] = None
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -91,7 +91,7 @@ class HapticMap(ABC):
         asked = self._asked
         if asked is None:
             # Looked up by name, so that a method replaced in its class is called.
-            asked = Asked(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
+            asked = PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
             object.__setattr__(self, "_asked", asked)  # keeps the callback alive, since the tick has only its address
         origin = np.array(_ORIGIN)
         start = self.pose(origin)
@@ -155,7 +155,7 @@ class KernelMap(HapticMap):
 
     def __init__(self, params: npt.ArrayLike) -> None:
         name = type(self).__name__
-        if self.map_kernel is own_map:  # which would take the first parameter for an address
+        if self.map_kernel is python_map:  # which would take the first parameter for an address
             raise ParameterError(f"{name} has no kernel; expected map_kernel = staticmethod(...) of an njit function")
         self._params = numbers_of(f"params of {name}", params)
         if self._params.ndim != 1:

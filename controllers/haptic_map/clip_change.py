@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.borrowed import borrowed
+from controllers.borrowed import without_refcount
 from controllers.curves.splines import control_points, interpolate
 from controllers.rotations import angular_velocity, exponential, multiply, rotate
 from controllers.state import Array, Pose
@@ -77,7 +77,7 @@ def known_between(changes: Array, first: float, second: float) -> bool:
 
 
 @njit
-def gate_behind(
+def passed_gate(
     changes: Array, first: float, second: float, before: float, now: float, lap: float
 ) -> tuple[int, float]:
     """Number and gate [s] of a change between two rivers whose gate lies between the phases `before` and `now`.
@@ -99,7 +99,7 @@ def gate_behind(
 
 
 @njit
-def change_lasts(changes: Array, k: int) -> float:
+def transition_duration(changes: Array, k: int) -> float:
     """T, duration of a change [s]."""
     return (changes[1 + k * _ENTRY_SIZE + _ROW_COUNT] - 1.0) / FPS - LEAD_IN
 
@@ -126,7 +126,7 @@ def add_change(changes: Array, k: int, s: float, along: Array, pose: Pose, jacob
     u = min(max((s + LEAD_IN) * FPS, 0.0), float(last))
     row = min(int(u), last - 1)
     offset, rate = work_array(size), work_array(size)
-    interpolate(borrowed(changes[int(entry[_FIRST_ROW]) + row * size :]), size, u - row, FPS, offset, rate)
+    interpolate(without_refcount(changes[int(entry[_FIRST_ROW]) + row * size :]), size, u - row, FPS, offset, rate)
     w, a, b, c = pose[3], pose[4], pose[5], pose[6]
     x, y, z = rotate(w, a, b, c, offset[0], offset[1], offset[2])
     pose[0], pose[1], pose[2] = pose[0] + x, pose[1] + y, pose[2] + z

@@ -7,10 +7,10 @@ import numpy as np
 from numba import njit
 
 from controllers.blending.blend import blend
-from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
+from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, kept_lap
+from controllers.haptic_map.animation import AnimationMap, stored_lap
 from controllers.legs.limbs import Limb
 from controllers.state import Array
 from controllers.work_array import work_array
@@ -124,12 +124,12 @@ class Composite(AnimationMap):
         ParameterError
             If an array is missing, or its values are not those of a map.
         """
-        clips, joints = kept_clips(arrays), kept(arrays, "upper_joints", (None,))
+        clips, joints = stored_clips(arrays), stored_array(arrays, "upper_joints", (None,))
         if len(clips) != _CLIPS or not np.isfinite(joints).all():
             raise ParameterError(f"a composite map has {_CLIPS} clips and joints, got {len(clips)} and {joints}")
         lower, red, blue = clips
-        r_low, r_high = kept(arrays, "r_range", (2,)).tolist()
-        upper, limbs = [int(joint) for joint in joints], kept_limbs(arrays)
-        share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, kept_lap(arrays), "apart" in arrays)
+        r_low, r_high = stored_array(arrays, "r_range", (2,)).tolist()
+        upper, limbs = [int(joint) for joint in joints], stored_limbs(arrays)
+        share = float(stored_array(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
+        result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, stored_lap(arrays), "apart" in arrays)
         return result.with_share(share)

@@ -8,11 +8,11 @@ from numba import njit
 
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.blend import blend_corrected
-from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs
+from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs
 from controllers.blending.combination import Mixture
-from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased
+from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, kept_lap
+from controllers.haptic_map.animation import AnimationMap, stored_lap
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -68,7 +68,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
 
 def _mixtures() -> tuple[Array, Array]:
     """The table's nodes (k, 2), as shares of r and z, and the weights of the clips there (k, 4)."""
-    ease, share = eased.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
+    ease, share = eased_weight.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
     nodes = np.interp(np.linspace(0.0, 1.0, _NODES), [ease(at, _TABLE_EASING)[0] for at in share], share)
     z, r = np.meshgrid(nodes, nodes)
     places = np.stack([r.ravel(), z.ravel()], axis=-1)
@@ -249,17 +249,17 @@ class Cylindrical(AnimationMap):
         ParameterError
             If an array is missing, or its values are not those of a map.
         """
-        (r_low, r_high), (z_low, z_high) = kept(arrays, "domain", (2, 2)).tolist()
-        limbs, corrections = kept_limbs(arrays), None
+        (r_low, r_high), (z_low, z_high) = stored_array(arrays, "domain", (2, 2)).tolist()
+        limbs, corrections = stored_limbs(arrays), None
         if limbs:
-            corrections = kept(arrays, "corrections", (None, *correction_shape(len(limbs))))
-        upper = kept(arrays, "upper_joints", (None,)) if "upper_joints" in arrays else np.zeros(0)
+            corrections = stored_array(arrays, "corrections", (None, *correction_shape(len(limbs))))
+        upper = stored_array(arrays, "upper_joints", (None,)) if "upper_joints" in arrays else np.zeros(0)
         if not np.isfinite(upper).all():
             raise ParameterError(f"'upper_joints' of the map must be finite, got {upper}")
-        clips, joints = kept_clips(arrays), [int(joint) for joint in upper]
-        owner = int(kept(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
-        share = float(kept(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
+        clips, joints = stored_clips(arrays), [int(joint) for joint in upper]
+        owner = int(stored_array(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
+        share = float(stored_array(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
         result = Cylindrical(
-            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, kept_lap(arrays), joints, owner
+            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, stored_lap(arrays), joints, owner
         )  # fmt: skip
         return result.with_share(share) if joints else result

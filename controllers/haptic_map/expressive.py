@@ -41,7 +41,7 @@ def stylus_turn(x: Array, turn: Array, rates: Array) -> None:
 
 
 @njit
-def yielded(wanted: float, there: float, low: float, high: float) -> tuple[float, float, float]:
+def saturate_at_limit(wanted: float, there: float, low: float, high: float) -> tuple[float, float, float]:
     r"""Turn f after soft saturation at a joint's limits, and its derivatives by `wanted` and by `there`.
 
     .. math:: f = y\,(1 + (y/R)^4)^{-1/4}
@@ -71,7 +71,7 @@ def _turn_joint(row: Array, turn: Array, rates: Array, q: Array, jacobian: Array
     e, by_turn, by_there = work_array(3), work_array(3), work_array(3)
     for i in range(3):
         gain = row[_GAIN + i]
-        e[i], slope, by_there[i] = yielded(gain * turn[i], v[i], row[_LOW + i], row[_HIGH + i])
+        e[i], slope, by_there[i] = saturate_at_limit(gain * turn[i], v[i], row[_LOW + i], row[_HIGH + i])
         by_turn[i] = slope * gain
     w, x, y, z = exponential(e[0], e[1], e[2])
     q[0], q[1], q[2], q[3] = multiply(q[0], q[1], q[2], q[3], w, x, y, z)

@@ -24,14 +24,14 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.cyclic_runs import runs
-from controllers.legs.grounded import grounded, hastened
+from controllers.legs.grounded import grounded, max_swing_speed_ratio
 from controllers.legs.limb_ends import with_ends
-from controllers.legs.limbs import END, LAST, LIMB, Limb, place_limb
+from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
 from controllers.legs.planted import with_planted_ends
-from controllers.legs.reaching import reached
-from controllers.motion.captures import Capture, low_passed
+from controllers.legs.reaching import solve_reach
+from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
-from controllers.motion.loops import checked_clip, forward_loop, turn_of, turned, yawed
+from controllers.motion.loops import checked_clip, forward_loop, rotate_about_vertical, rotate_in_plane, turn_of
 from controllers.rotations import multiply, relative
 from controllers.state import Array, Mask
 from controllers.walking.walked_path import (
@@ -48,7 +48,7 @@ from controllers.work_array import work_array
 
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
-LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
+MIN_TRAVEL, MAX_TURN = 0.5, np.deg2rad(30.0)
 """Least length [m] and largest turn [rad] of a led clip's lap; `models.mocap.preparation.laps` cuts laps by them."""
 
 _LEAN_ROUNDING = 0.015  # [rad] lean below which the root is hardly lowered: rounding of |φ| at zero
@@ -153,10 +153,10 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     """Kernel of `Led`: h(s, u) with (s, u) = x[:2], and h_* unless `jacobian` has no rows; the memory is the path."""
     stride = params[_STRIDE]
     samples, rotations, limbs = int(params[_SAMPLES]), int(params[_ROTATIONS]), int(params[_LIMBS])
-    n, s, rate = 3 + 4 * rotations + END * limbs, x[0], 1.0 / stride
+    n, s, rate = 3 + 4 * rotations + N_END_CHANNELS * limbs, x[0], 1.0 / stride
     value, slope, change = work_array(n), work_array(n), work_array(n)
     change[:] = 0.0
-    rows, lap = params[_HEADER + LIMB * limbs :], s / stride + params[_PHASE]
+    rows, lap = params[_HEADER + LIMB_SIZE * limbs :], s / stride + params[_PHASE]
     if params[_FORMS] > 1.0:
         _mix_forms(rows, samples, lap, x[1], value, slope, change)
     else:
@@ -176,14 +176,14 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
         _unit_rotation(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
-        limb = params[_HEADER + LIMB * i : _HEADER + LIMB * (i + 1)]
-        last, at = int(limb[LAST]), 3 + 4 * rotations + END * i
+        limb = params[_HEADER + LIMB_SIZE * i : _HEADER + LIMB_SIZE * (i + 1)]
+        last, at = int(limb[LAST]), 3 + 4 * rotations + N_END_CHANNELS * i
         for numbers, channels in ((part, value), (by_lap, slope), (by_form, change)):
             numbers[:3], numbers[3:] = channels[at : at + 3], channels[3 + 4 * last : 7 + 4 * last]
         s_end, pace = s + stride * value[at + 3], 1.0 + slope[at + 3]
         _carry_along(path, s_end, stride * change[at + 3], 1.0, 0.0, 0.0, part, by_form, 1, end, q[last], spins[last])
         _carry_along(path, s_end, pace, rate, 0.0, 0.0, part, by_lap, 0, end, q[last], spins[last])
-        place_limb(limb, q, spins, root, end, tangents)
+        solve_limb(limb, q, spins, root, end, tangents)
     pose[:3] = root[0]
     for joint in range(rotations):
         pose[3 + 4 * joint : 7 + 4 * joint] = q[joint]
@@ -220,7 +220,7 @@ def _forms_of_capture(
     planted = with_planted_ends(rows, *clip_and_limbs, steps, still if flights else sway)
     low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stands, sway)
     if low is not None:
-        return _ClipForms([reached(low, steps, limbs)], steps, False, True, 1.0 / hastened(stands))
+        return _ClipForms([solve_reach(low, steps, limbs)], steps, False, True, 1.0 / max_swing_speed_ratio(stands))
     if flights:
         planted = with_planted_ends(rows, *clip_and_limbs, stride, still)
     return _ClipForms([planted], stride, bool(flights))
@@ -286,20 +286,20 @@ class Led(KernelMap):
         self.phase = phase
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration
-        if self.stride < LEAST_TRAVEL or abs(turn) > LARGEST_TURN:
+        if self.stride < MIN_TRAVEL or abs(turn) > MAX_TURN:
             raise ParameterError(
-                f"a clip that is led must go somewhere: {LEAST_TRAVEL} m or more a lap, turning by at most "
-                f"{np.degrees(LARGEST_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
+                f"a clip that is led must go somewhere: {MIN_TRAVEL} m or more a lap, turning by at most "
+                f"{np.degrees(MAX_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
                 f"{np.degrees(turn):.0f}°. Walk and run do"
             )
         samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
         # The path is along x, whichever way the figure faces while it walks.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
-        channels[:, :2] = turned(course, channels[:, :2])
-        channels[:, 3:7] = yawed(course, channels[:, 3:7])
+        channels[:, :2] = rotate_in_plane(course, channels[:, :2])
+        channels[:, 3:7] = rotate_about_vertical(course, channels[:, 3:7])
         if capture is not None:
-            channels = low_passed(channels, self.duration, capture.cutoff)
+            channels = low_pass(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
         limbs = [limb.allowing([channels]) for limb in limbs]
         rows = with_ends(channels[:, None], drift, limbs, np.ones(1))[:, 0]
@@ -316,7 +316,7 @@ class Led(KernelMap):
                 clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
         forms, self.stride, self.flies, self.grounds, self.pace = clip_forms
         self.sways = self.grounds or (capture is not None and not self.flies)
-        lags = np.array([form[:, channels.shape[1] + 3 :: END] for form in forms])
+        lags = np.array([form[:, channels.shape[1] + 3 :: N_END_CHANNELS] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _LOWERING_RATIO * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
         header = [self.stride, phase, samples, self._rotations, len(limbs), len(forms), width]

@@ -5,13 +5,13 @@ from copy import copy
 
 import numpy as np
 
-from controllers.blending.clip_arrays import clip_arrays, kept, kept_clips, kept_limbs, kept_names
+from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs, stored_names
 from controllers.blending.combination import fresh_lap
-from controllers.curves.splines import round_lap
+from controllers.curves.splines import periodic_interpolation
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.lifted_kernel import lifted_map, packed_lifted, weigh, with_legs_of
+from controllers.haptic_map.lifted_kernel import clip_weights, lifted_map, packed_lifted, with_legs_of
 from controllers.haptic_map.lifting.frames import CLOSES, PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
@@ -137,7 +137,7 @@ class Lifted(ClipMap):
 
     def site(self, i: int, angles: Array) -> Array:
         """q_i = (r, z) [m] of curve i at angles (...), shape (..., 2)."""
-        return round_lap(self.sites[:, i], angles)
+        return periodic_interpolation(self.sites[:, i], angles)
 
     def curve_point(self, i: int, angle: float) -> Array:
         """Point [m] of curve i at an angle of the lap, shape (3,)."""
@@ -157,7 +157,7 @@ class Lifted(ClipMap):
         """Weights w_i (m,) of the clips at a stylus pose (7,); their sum is 1."""
         m = len(self.clips)
         near, w, changes, result = np.empty(m, dtype=np.int64), np.empty(m), np.empty((3, m)), np.zeros(m)
-        _, count = weigh(self._params, np.asarray(x, dtype=np.float64), np.empty((3, 6)), near, w, changes)
+        _, count = clip_weights(self._params, np.asarray(x, dtype=np.float64), np.empty((3, 6)), near, w, changes)
         result[near[:count]] = w[:count]
         return result
 
@@ -210,16 +210,16 @@ class Lifted(ClipMap):
         ParameterError
             If an array is missing, or its values are not those of a map.
         """
-        names = kept_names(arrays)
+        names = stored_names(arrays)
         return Lifted(
-            kept_clips(arrays),
-            [_checked_flag(f"closed/{name}", float(kept(arrays, f"closed/{name}", (1,))[0])) for name in names],
-            [kept(arrays, f"angles/{name}", (None,)) for name in names],
-            kept(arrays, "sites", (None, None, 2)),
-            kept_limbs(arrays),
+            stored_clips(arrays),
+            [_checked_flag(f"closed/{name}", float(stored_array(arrays, f"closed/{name}", (1,))[0])) for name in names],
+            [stored_array(arrays, f"angles/{name}", (None,)) for name in names],
+            stored_array(arrays, "sites", (None, None, 2)),
+            stored_limbs(arrays),
             names,
-            float(kept(arrays, "margin", (1,))[0]),
-            kept(arrays, "transitions", (None, 5)),
+            float(stored_array(arrays, "margin", (1,))[0]),
+            stored_array(arrays, "transitions", (None, 5)),
         )
 
 

@@ -17,18 +17,18 @@ from controllers.blending.combination import (
 )
 from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.curves.cylinder import cylinder
-from controllers.curves.splines import basis, basis_slope, control_points, round_lap
-from controllers.haptic_map.lifting.cores import draw_in
+from controllers.curves.splines import basis, basis_slope, control_points, periodic_interpolation
+from controllers.haptic_map.lifting.cores import attract_to_core
 from controllers.haptic_map.lifting.frames import PlacedClip, frames_at, interpolate_frames, lap_spline, packed_frames
 from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
 from controllers.haptic_map.lifting.sites import box
 from controllers.legs.floor import SOFTNESS
 from controllers.legs.footing import packed_soles
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
-from controllers.legs.limbs import END, Limb
+from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
-from controllers.saturation import clamped
+from controllers.saturation import soft_clamp
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
 
@@ -52,17 +52,17 @@ def _write_lags(control: Array, limbs: int, angle: float, channels: int, value: 
     for n in range(limbs):
         v0, v1 = control[row * limbs + n], control[(row + 1) * limbs + n]
         v2, v3 = control[(row + 2) * limbs + n], control[(row + 3) * limbs + n]
-        k = channels - END * (limbs - n) + 3
+        k = channels - N_END_CHANNELS * (limbs - n) + 3
         value[0, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
         slope[0, k] = _LAG_SAMPLES / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
 
 
 @njit
-def weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, changes: Array) -> tuple[float, int]:
+def clip_weights(params: Array, x: Array, chain: Array, near: IntArray, w: Array, changes: Array) -> tuple[float, int]:
     """Angle of the hand and number of nearby clips; writes `near`, weights w and their derivatives `changes` (3, m)."""
     radius, angle = cylinder(x, chain)
-    r, r_slope = clamped(radius, params[_R_LOW], params[_R_HIGH], params[_MARGIN])
-    z, z_slope = clamped(x[2], params[_Z_LOW], params[_Z_HIGH], params[_MARGIN])
+    r, r_slope = soft_clamp(radius, params[_R_LOW], params[_R_HIGH], params[_MARGIN])
+    z, z_slope = soft_clamp(x[2], params[_Z_LOW], params[_Z_HIGH], params[_MARGIN])
     for k in range(6):
         chain[1, k] *= r_slope
         chain[2, k] *= z_slope
@@ -71,7 +71,7 @@ def weigh(params: Array, x: Array, chain: Array, near: IntArray, w: Array, chang
     neighbours = params[int(params[_NEAR_AT]) :]
     count = near_clips(neighbours, angle, r, z, near, sites, slopes)
     place, change = work_array(2), work_array((3, 2))
-    if not draw_in(r, z, sites[:count], slopes[:count], place, change):
+    if not attract_to_core(r, z, sites[:count], slopes[:count], place, change):
         near_weights(neighbours, r, z, sites[:count], slopes[:count], w[:count], changes[:, :count])
         return angle, count
     count = near_clips(neighbours, angle, place[0], place[1], near, sites, slopes)
@@ -114,7 +114,7 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
     total, chain, owner = int(params[_CLIPS]), work_array((3, 6)), int(params[_LEGS_OF]) - 1
     groups = 2 if owner >= 0 else 1  # the last group has the weights at the position of the hand
     near, w, changes = work_integers(total), work_array((groups, total)), work_array((groups, 3, total))
-    angle, count = weigh(params, x, chain, near, w[groups - 1], changes[groups - 1])
+    angle, count = clip_weights(params, x, chain, near, w[groups - 1], changes[groups - 1])
     if owner >= 0:
         count = _assign_legs(owner, params[_SHARE], near, count, w, changes)
     figure = params[_FIGURE:]
@@ -175,7 +175,7 @@ def with_legs_of(params: Array, clip: int, upper: Sequence[int], share: float) -
 def _clip_channels(clip: PlacedClip, lags: Array, limbs: Sequence[Limb]) -> Array:
     """Channels of a clip at its frames: the remainder, then each limb's end."""
     result, ends = clip.remainder[:, None], list[Array]()
-    rest, lag = result.copy(), round_lap(lags, clip.angles)
+    rest, lag = result.copy(), periodic_interpolation(lags, clip.angles)
     for n, limb in enumerate(limbs):
         quaternions, end = end_channels(rest, clip.drift[None], limb, lag[:, n])
         result[..., 3 + 4 * limb.joints[2] : 7 + 4 * limb.joints[2]] = quaternions
@@ -199,11 +199,11 @@ def _packed_pairs(
     """Corrections of in-betweens of neighbouring clips, a table of `rows` phases round the lap."""
     phases = np.arange(rows) * 2.0 * np.pi / rows
     channels = np.stack([frames_at(spline, phases) for spline in splines], axis=1)
-    last = channels.shape[2] - END * len(limbs)
+    last = channels.shape[2] - N_END_CHANNELS * len(limbs)
     normalise(channels, (last - 3) // 4)
     for n in range(len(limbs)):
-        channels[..., last + END * n + 3] = round_lap(lags[:, n], phases)[:, None]
-    steps = round_lap(sites, np.arange(_PAIR_SAMPLES) * 2.0 * np.pi / _PAIR_SAMPLES)
+        channels[..., last + N_END_CHANNELS * n + 3] = periodic_interpolation(lags[:, n], phases)[:, None]
+    steps = periodic_interpolation(sites, np.arange(_PAIR_SAMPLES) * 2.0 * np.pi / _PAIR_SAMPLES)
     return packed_pairs(channels, drifts, limbs, neighbouring_pairs(steps))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit, types
 
 from controllers.errors import ControllerError, ParameterError
-from controllers.kernel_call import announce, kernel_call
+from controllers.kernel_call import kernel_call, register_kernel
 from controllers.state import Array, IntArray
 from controllers.work_array import work_array
 
@@ -38,7 +38,7 @@ def register(kernel: Kernel) -> None:
     if not hasattr(kernel, "py_func"):
         raise ParameterError(f"the kernel of a map is {kernel!r}; expected a function compiled by numba's njit")
     if kernel not in _registered_kernels:
-        announce(kernel, MAP_ARGUMENTS)
+        register_kernel(kernel, MAP_ARGUMENTS)
         _registered_kernels.append(kernel)
 
 

@@ -49,13 +49,13 @@ _call_callback = cast(Callable[[int, int, int, int, int, int], None], _call_c_fu
 
 
 @njit
-def own_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    """Kernel of a map in Python: the bits of the first parameter are the address of the callback (see `Asked`)."""
+def python_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    """Kernel of a map in Python: the first parameter holds the address of the callback (see `PythonCallback`)."""
     place, rows = params.view(np.int64)[0], jacobian.shape[0]
     _call_callback(place, x.ctypes.data, pose.ctypes.data, jacobian.ctypes.data, pose.shape[0], rows)
 
 
-class Asked:
+class PythonCallback:
     """C callback of a map for the tick; the first error in a run is stored, and the pose then stays at its last value.
 
     Parameters

@@ -11,53 +11,53 @@ from controllers.blending.combination import fresh_lap
 from controllers.curves.trajectory import START, Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
-from controllers.haptic_map.clip_change import ClipChange, add_change, change_lasts, packed_changes
+from controllers.haptic_map.clip_change import ClipChange, add_change, packed_changes, transition_duration
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.river_memory import (
-    AHEAD,
+    ACTIVE_RIVER,
     BLEND,
-    CHANGE,
+    CLIP_PHASE,
     CURVES,
-    GATE,
-    PHASE,
-    RIVER,
+    GATE_PHASE,
+    HAND_PHASE,
+    HELD,
+    LEAD,
     RIVERS,
-    SHOWN,
-    STILL,
-    after,
+    TRANSITION,
     changes_of,
     in_round,
     lead_of,
     phase_near,
     round_of,
+    time_after,
     timing_curve,
 )
 from controllers.legs.limbs import Limb
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-LONGEST = 0.7  # longest duration of a change, as a fraction of a round
+MAX_CHANGE_FRACTION = 0.7  # longest duration of a change, as a fraction of a round
 _LAP_TOLERANCE = 1e-6  # [s] largest difference between the laps of two rivers that have a change between them
 
 
 @njit
 def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian: Array) -> None:
     """Kernel of `RiverClips`: h(x), and h_*(x) unless `jacobian` has no rows."""
-    river, rivers = int(memory[RIVER]), int(params[RIVERS])
+    river, rivers = int(memory[ACTIVE_RIVER]), int(params[RIVERS])
     curve = timing_curve(params, memory)
-    phase = memory[PHASE] if memory[STILL] > 0.0 else phase_near(params, curve, x, memory[PHASE])
+    phase = memory[HAND_PHASE] if memory[HELD] > 0.0 else phase_near(params, curve, x, memory[HAND_PHASE])
     start, period = params[curve + START], round_of(params, curve)
     pace, rate, shown = 2.0 * np.pi / period, 1.0, phase
-    memory[PHASE] = phase
-    if memory[AHEAD] != 0.0:
+    memory[HAND_PHASE] = phase
+    if memory[LEAD] != 0.0:
         lead, decay = lead_of(params, memory, phase)
         shown, rate = in_round(params, curve, phase + lead), rate + decay
-        memory[AHEAD] = memory[AHEAD] if abs(lead) > 0.0 else 0.0
-    memory[SHOWN] = shown
-    known, change, since = changes_of(params), int(memory[CHANGE]), 0.0
+        memory[LEAD] = memory[LEAD] if abs(lead) > 0.0 else 0.0
+    memory[CLIP_PHASE] = shown
+    known, change, since = changes_of(params), int(memory[TRANSITION]), 0.0
     if change >= 0:
-        since = after(shown - start, memory[GATE], period)
-        memory[CHANGE] = memory[CHANGE] if since < change_lasts(known, change) else -1.0
+        since = time_after(shown - start, memory[GATE_PHASE], period)
+        memory[TRANSITION] = memory[TRANSITION] if since < transition_duration(known, change) else -1.0
     point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend = curve_acceleration(params, curve, phase)
     # Differentiating (φ − p)·φ̇ = 0 at the nearest point gives dt*/dp = φ̇ / (|φ̇|² + (φ − p)·φ̈).
@@ -67,7 +67,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     chain = work_array((3, 6))
     chain[:] = 0.0
     for i in range(3):
-        chain[0, i] = rate * pace * tangent[i] / slope if slope > 0.0 and memory[STILL] == 0.0 else 0.0
+        chain[0, i] = rate * pace * tangent[i] / slope if slope > 0.0 and memory[HELD] == 0.0 else 0.0
     weights, changes = work_array((1, rivers)), work_array((1, 3, rivers))
     weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0
@@ -197,7 +197,7 @@ class RiverClips(AnimationMap):
                 raise ParameterError(f"{name} is between laps of {laps[change.first]} and {laps[change.second]} s")
             if not len(change.gates) or change.offsets.shape[1:] != (3 + 3 * ((self.nq - 3) // 4),):
                 raise ParameterError(f"{name} has {len(change.gates)} gates and offsets {change.offsets.shape}")
-            if not 0.0 < change.seconds < LONGEST * self.round_seconds(change.first):
+            if not 0.0 < change.seconds < MAX_CHANGE_FRACTION * self.round_seconds(change.first):
                 period = self.round_seconds(change.first)
                 raise ParameterError(f"{name} lasts {change.seconds:.2f} s of a round of {period:.2f} s")
         other = copy(self)

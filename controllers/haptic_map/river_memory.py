@@ -13,7 +13,7 @@ from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, curve_acceleration, curve_point, curve_velocity, wrap_phase
 from controllers.easing import smooth_step, smooth_step_slope
-from controllers.haptic_map.clip_change import gate_behind, known_between
+from controllers.haptic_map.clip_change import known_between, passed_gate
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
 from controllers.rotations import multiply
 from controllers.state import Array, Pose
@@ -24,11 +24,22 @@ from controllers.work_array import work_array
 # COURSE: river whose curve gives the phase of the hand. CAME: phase at which the hand came to it. AHEAD: lead of the
 # clip over the hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate.
 # LOOKED: phase shown when gates were last searched.
-RIVER, PHASE, STILL, COURSE, CAME, AHEAD, SHOWN, CHANGE, GATE, LOOKED = range(MEMORY, MEMORY + 10)
+(
+    ACTIVE_RIVER,
+    HAND_PHASE,
+    HELD,
+    TIMING_RIVER,
+    ENTRY_PHASE,
+    LEAD,
+    CLIP_PHASE,
+    TRANSITION,
+    GATE_PHASE,
+    LAST_SEARCH_PHASE,
+) = range(MEMORY, MEMORY + 10)
 # Parameters: header; offsets of the packed curves, of the rest phases and of the changes; these blocks; the blend.
 RIVERS, TUBE, LAPS, BLEND, CURVES = range(5)
 _MAX_PACE = 2.0  # largest pace, in multiples of the river's, of a hand that no river holds: a faster one plays no clip
-# [s] horizon of the prediction in `lets_go`: without it the root's velocity jumps by up to 3.7 m/s
+# [s] horizon of the prediction in `has_left_river`: without it the root's velocity jumps by up to 3.7 m/s
 _PREDICTION_TIME = 0.03
 # deviation from the river's pace up to which the hand is followed without lag; encoder noise is 1 %
 _PACE_TOLERANCE = 0.02
@@ -85,7 +96,7 @@ def phase_near(params: Array, curve: int, x: Array, last: float) -> float:
 @njit
 def timing_curve(params: Array, memory: Array) -> int:
     """Offset in the parameters of the curve that gives the phase of the hand."""
-    return int(params[CURVES + int(memory[COURSE])])
+    return int(params[CURVES + int(memory[TIMING_RIVER])])
 
 
 @njit
@@ -95,7 +106,7 @@ def changes_of(params: Array) -> Array:
 
 
 @njit
-def after(phase: float, moment: float, period: float) -> float:
+def time_after(phase: float, moment: float, period: float) -> float:
     """Time of a phase after a moment of the round [s]; negative up to a quarter of the round before it."""
     elapsed = phase - moment
     return elapsed - period * np.floor(elapsed / period + _PAST_FRACTION)
@@ -104,8 +115,8 @@ def after(phase: float, moment: float, period: float) -> float:
 @njit
 def lead_of(params: Array, memory: Array, phase: float) -> tuple[float, float]:
     """Lead [s] of the clip over a hand at a phase [s], which decays with the phase, and its derivative by the phase."""
-    progress = after(phase, memory[CAME], round_of(params, timing_curve(params, memory))) / _CATCH_UP_TIME
-    return memory[AHEAD] * (1.0 - smooth_step(progress)), -memory[AHEAD] * smooth_step_slope(progress) / _CATCH_UP_TIME
+    progress = time_after(phase, memory[ENTRY_PHASE], round_of(params, timing_curve(params, memory))) / _CATCH_UP_TIME
+    return memory[LEAD] * (1.0 - smooth_step(progress)), -memory[LEAD] * smooth_step_slope(progress) / _CATCH_UP_TIME
 
 
 @njit
@@ -117,7 +128,7 @@ def _absorbed_share(lead: float, faster: bool) -> float:
 
 
 @njit
-def even_pace(params: Array, memory: Array, x: Array, way: float, changed: Array) -> None:
+def absorb_excess_pace(params: Array, memory: Array, x: Array, way: float, changed: Array) -> None:
     r"""Let the clip's lead absorb the excess of the hand's pace over the river's, so that a push rushes no clip.
 
     .. math:: \dot e = -c\,(r - \operatorname{sat}(r, 1 \pm 0.02)), \qquad
@@ -139,43 +150,43 @@ def even_pace(params: Array, memory: Array, x: Array, way: float, changed: Array
         A copy of the memory, or the memory itself; updated for the hand at x.
     """
     curve = timing_curve(params, memory)
-    phase, period = phase_near(params, curve, x, memory[PHASE]), round_of(params, curve)
-    step = phase - memory[PHASE]
+    phase, period = phase_near(params, curve, x, memory[HAND_PHASE]), round_of(params, curve)
+    step = phase - memory[HAND_PHASE]
     step -= period * np.round(step / period)
     off = step - min(max(step, way - _PACE_TOLERANCE * abs(way)), way + _PACE_TOLERANCE * abs(way))
     # Not if the clip is held, or the phase of the hand is not known yet.
-    if memory[STILL] == 0.0 and abs(off) > 0.0:
-        lead, _ = lead_of(params, memory, memory[PHASE])
+    if memory[HELD] == 0.0 and abs(off) > 0.0:
+        lead, _ = lead_of(params, memory, memory[HAND_PHASE])
         half = lead - 0.5 * _absorbed_share(lead, off * way > 0.0) * off
-        changed[AHEAD], changed[CAME] = lead - _absorbed_share(half, off * way > 0.0) * off, phase
+        changed[LEAD], changed[ENTRY_PHASE] = lead - _absorbed_share(half, off * way > 0.0) * off, phase
 
 
 @njit
-def takes_over(params: Array, memory: Array, river: float) -> bool:
+def is_taken_over(params: Array, memory: Array, river: float) -> bool:
     """Whether the field's active river (−1: none) takes over the hand from another river, or a held clip continues.
 
     The clip then begins at the phase of the hand on that river.
     """
-    other = river != memory[RIVER] or river != memory[COURSE]
-    return 0.0 <= river < params[RIVERS] and (other or memory[STILL] > 0.0)
+    other = river != memory[ACTIVE_RIVER] or river != memory[TIMING_RIVER]
+    return 0.0 <= river < params[RIVERS] and (other or memory[HELD] > 0.0)
 
 
 @njit
 def phase_rate(params: Array, memory: Array, later: Array, period: float) -> float:
     """Pace at which the hand plays the clip, 1 for the river's own, from the memory `later`, one `period` [s] on."""
-    round_duration, step = round_of(params, timing_curve(params, memory)), later[PHASE] - memory[PHASE]
+    round_duration, step = round_of(params, timing_curve(params, memory)), later[HAND_PHASE] - memory[HAND_PHASE]
     return (step - round_duration * np.round(step / round_duration)) / period
 
 
 @njit
-def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
+def has_left_river(params: Array, memory: Array, river: float, hand: Array, rate: float) -> bool:
     """Whether the hand has left the river of the playing clip: no river is active, and it is off the tube or too fast.
 
     `hand` (3, 3) holds position, velocity and acceleration. So that the clip does not follow a hand that is thrown off
     the curve, the pace predicted `_PREDICTION_TIME` ahead counts too, and so does a predicted position more than half
     way to the centre of curvature, where the phase is not a useful measure of pace.
     """
-    if river >= 0.0 or memory[STILL] > 0.0:
+    if river >= 0.0 or memory[HELD] > 0.0:
         return False
     curve = timing_curve(params, memory)
     found, x, v = work_array((BRANCHES, 2)), work_array(3), work_array(3)
@@ -185,7 +196,7 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
     for i in range(3):
         x[i] = hand[0, i] + _PREDICTION_TIME * hand[1, i] + 0.5 * _PREDICTION_TIME**2 * hand[2, i]
         v[i] = hand[1, i] + _PREDICTION_TIME * hand[2, i]
-    phase = phase_near(params, curve, x, memory[PHASE])
+    phase = phase_near(params, curve, x, memory[HAND_PHASE])
     point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
     bend, gain, slope, square = curve_acceleration(params, curve, phase), 0.0, 0.0, 0.0
     for i in range(3):
@@ -198,85 +209,90 @@ def lets_go(params: Array, memory: Array, river: float, hand: Array, rate: float
 @njit
 def change_clip(params: Array, memory: Array, river: float, phase: float) -> None:
     """Play the clip of another river, from a phase [s] on of the lap that the hand is in, in the frame of the lap."""
-    phase = _nearest_lap_phase(params, int(params[CURVES + int(river)]), phase, memory[PHASE])
-    memory[RIVER], memory[PHASE], memory[STILL], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
-    memory[COURSE], memory[AHEAD], memory[SHOWN], memory[CHANGE] = river, 0.0, phase, -1.0
+    phase = _nearest_lap_phase(params, int(params[CURVES + int(river)]), phase, memory[HAND_PHASE])
+    memory[ACTIVE_RIVER], memory[HAND_PHASE], memory[HELD], memory[LAST_ANGLE] = river, phase, 0.0, np.nan
+    memory[TIMING_RIVER], memory[LEAD], memory[CLIP_PHASE], memory[TRANSITION] = river, 0.0, phase, -1.0
 
 
 @njit
-def knows_change(params: Array, memory: Array, river: float) -> bool:
+def has_transition(params: Array, memory: Array, river: float) -> bool:
     """Whether a precomputed change leads from the playing clip to that of a river, or the river is already playing."""
-    if memory[STILL] > 0.0:
+    if memory[HELD] > 0.0:
         return False
-    return river == memory[RIVER] or known_between(changes_of(params), memory[RIVER], river)
+    return river == memory[ACTIVE_RIVER] or known_between(changes_of(params), memory[ACTIVE_RIVER], river)
 
 
 @njit
 def gate_passed(params: Array, memory: Array, river: float) -> tuple[int, float]:
     """Number and gate [s] of a change to a river whose gate was passed since the last call; number −1 if none was."""
-    curve, before = timing_curve(params, memory), memory[LOOKED]
-    memory[LOOKED] = memory[SHOWN]
+    curve, before = timing_curve(params, memory), memory[LAST_SEARCH_PHASE]
+    memory[LAST_SEARCH_PHASE] = memory[CLIP_PHASE]
     start, period = params[curve + START], round_of(params, curve)
-    return gate_behind(changes_of(params), memory[RIVER], river, before - start, memory[SHOWN] - start, period)
+    return passed_gate(
+        changes_of(params), memory[ACTIVE_RIVER], river, before - start, memory[CLIP_PHASE] - start, period
+    )
 
 
 @njit
 def changing(memory: Array) -> bool:
     """Whether a precomputed change is in progress."""
-    return bool(memory[CHANGE] >= 0.0)
+    return bool(memory[TRANSITION] >= 0.0)
 
 
 @njit
-def take_course(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
+def follow_other_curve(params: Array, memory: Array, river: float, x: Array, shown: float) -> None:
     """Take the phase of the hand at x from another river's curve, while the playing clip shows phase `shown` [s]."""
-    memory[COURSE] = river
+    memory[TIMING_RIVER] = river
     curve = timing_curve(params, memory)
     phase = phase_near(params, curve, x, shown)
     period, lead = round_of(params, curve), shown - phase
-    memory[PHASE], memory[CAME], memory[AHEAD] = phase, phase, lead - period * np.round(lead / period)
+    memory[HAND_PHASE], memory[ENTRY_PHASE], memory[LEAD] = phase, phase, lead - period * np.round(lead / period)
 
 
 @njit
 def hold_at_gate(params: Array, memory: Array, gate: float) -> None:
     """Hold the playing clip at a gate [s]."""
-    memory[PHASE] = params[timing_curve(params, memory) + START] + gate
-    memory[STILL], memory[AHEAD] = 1.0, 0.0
+    memory[HAND_PHASE] = params[timing_curve(params, memory) + START] + gate
+    memory[HELD], memory[LEAD] = 1.0, 0.0
 
 
 @njit
 def begin_change(memory: Array, river: float, change: int, gate: float) -> None:
     """Play the clip of another river through a precomputed change, from its gate [s] on."""
-    memory[RIVER], memory[LAST_ANGLE], memory[CHANGE], memory[GATE] = river, np.nan, change, gate
+    memory[ACTIVE_RIVER], memory[LAST_ANGLE], memory[TRANSITION], memory[GATE_PHASE] = river, np.nan, change, gate
 
 
 @njit
-def go_on(memory: Array, phase: float, ahead: float) -> None:
+def resume_clip(memory: Array, phase: float, ahead: float) -> None:
     """Let a held clip continue with the hand at a phase [s], ahead of the hand by a time [s]."""
-    memory[PHASE], memory[AHEAD], memory[STILL] = phase, ahead, 0.0
+    memory[HAND_PHASE], memory[LEAD], memory[HELD] = phase, ahead, 0.0
 
 
 @njit
 def stop_clip(params: Array, memory: Array, way: float) -> None:
     """Hold the playing clip at the rest phase nearest to `way` [s] after the shown phase; without any, just there."""
-    river, rivers, curve = int(memory[RIVER]), int(params[RIVERS]), timing_curve(params, memory)
+    river, rivers, curve = int(memory[ACTIVE_RIVER]), int(params[RIVERS]), timing_curve(params, memory)
     period = round_of(params, curve)
     first, last = int(params[CURVES + rivers + river]), int(params[CURVES + rivers + river + 1])
-    wanted = in_round(params, curve, memory[SHOWN] + way)
+    wanted = in_round(params, curve, memory[CLIP_PHASE] + way)
     best, nearest = wanted, math.inf
     for k in range(first, last):
         distance = abs(params[k] - wanted)
         distance = min(distance, period - distance)
         if distance < nearest:
             best, nearest = params[k], distance
-    memory[PHASE], memory[STILL], memory[LAST_ANGLE] = best, 1.0, np.nan
-    memory[AHEAD], memory[CHANGE] = 0.0, -1.0
+    memory[HAND_PHASE], memory[HELD], memory[LAST_ANGLE] = best, 1.0, np.nan
+    memory[LEAD], memory[TRANSITION] = 0.0, -1.0
 
 
 @njit
-def ahead_in_clip(params: Array, memory: Array, seconds: float) -> None:
+def advance_clip(params: Array, memory: Array, seconds: float) -> None:
     """Advance the playing clip by `seconds` at its river's own pace and hold it there; a held clip stays."""
-    if memory[STILL] == 0.0:
-        memory[PHASE], memory[STILL] = in_round(params, timing_curve(params, memory), memory[PHASE] + seconds), 1.0
+    if memory[HELD] == 0.0:
+        memory[HAND_PHASE], memory[HELD] = (
+            in_round(params, timing_curve(params, memory), memory[HAND_PHASE] + seconds),
+            1.0,
+        )
 
 
 @njit

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import CompiledMap
@@ -57,7 +57,7 @@ class Sized(Wrapped):
     map_kernel = staticmethod(size_pose)
 
     def __init__(self, base: HapticMap, size: float) -> None:
-        of_kind("size", size, float)
+        check_kind("size", size, float)
         if not 0.0 < size < np.inf:
             raise ParameterError(f"size is {size:g}; expected more than 0, and finite")
         super().__init__(base, np.array([float(size)]))

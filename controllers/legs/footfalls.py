@@ -24,20 +24,20 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.easing import smooth_steps
-from controllers.legs.limb_ends import SHARP, contact_moves, lowest_point
-from controllers.legs.limbs import END, Limb
-from controllers.legs.sole_heights import STANDS, SWINGS
-from controllers.motion.channels import continuous
+from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, lowest_point
+from controllers.legs.limbs import N_END_CHANNELS, Limb
+from controllers.legs.sole_heights import STANCE_HEIGHT, SWING_HEIGHT
+from controllers.motion.channels import with_continuous_signs
 from controllers.motion.inbetween import FOOT, ROOT
-from controllers.motion.loops import plane_exponential, turned, yawed
+from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
 from controllers.state import Array
 
 CATCH_UP = 8.0
 """Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends
 and of led captures by at most 0.1 mm."""
 
-# Largest fractions of a foot's highest lift in the lap that `STANDS` and h_0 (which is `SWINGS`) may take up. With half
-# or twice h_0 a blend of cheer and ginga still slides 1.0 cm; a blend of walk, run, ginga and cheer, which no map
+# Largest fractions of a foot's highest lift in the lap that `STANCE_HEIGHT` and h_0 (`SWING_HEIGHT`) may take up. With
+# half or twice h_0 a blend of cheer and ginga still slides 1.0 cm; a blend of walk, run, ginga and cheer, which no map
 # blends as a whole, slides 2.3 or 0.8 cm in the median instead of 1.0.
 _MAX_STANCE_FRACTION, _MAX_SWING_FRACTION = 0.2, 0.5
 # [m] a foot whose highest lift in the lap is below this is held less, one that is never lifted not
@@ -78,10 +78,10 @@ def _mean_rotations(quaternions: Array, weights: Array) -> Array:
     """Chordal means (n, k, 4) of rotations (n, m, 4) with weights (k, m); signs continuous along n."""
     n, m, _ = quaternions.shape
     squares = (quaternions[..., :, None] * quaternions[..., None, :]).reshape(n, m, 16)
-    return continuous(np.linalg.eigh((weights @ squares).reshape(n, -1, 4, 4))[1][..., -1])
+    return with_continuous_signs(np.linalg.eigh((weights @ squares).reshape(n, -1, 4, 4))[1][..., -1])
 
 
-def gap(slips: Array, hold: Array, turn: Array) -> Array:
+def accumulated_slip(slips: Array, hold: Array, turn: Array) -> Array:
     """Accumulated slip c of a foot, c' = slip − κ g c: average of forward and backward integration round the lap.
 
     Parameters
@@ -106,10 +106,10 @@ def gap(slips: Array, hold: Array, turn: Array) -> Array:
             front = decay[k] * front + slips[k]
         for k in range(n - 1, -1, -1):
             if k == n - 1:
-                back[..., :2] = turned(angle, back[..., :2])
+                back[..., :2] = rotate_in_plane(angle, back[..., :2])
             back = decay[k] * back - slips[k]
             behind[k] = back
-        front[..., :2] = turned(-angle, front[..., :2])
+        front[..., :2] = rotate_in_plane(-angle, front[..., :2])
     return 0.5 * (ahead + behind)
 
 
@@ -152,26 +152,26 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         lag = np.append(ends[:, 0, 3], ends[0, 0, 3])
         shift, angle = plane_exponential((np.arange(n + 1) / n + lag)[:, None, None] * (weights @ drifts))
         place, turn = np.einsum("km,nmx->nkx", weights, ends[..., :3]), _mean_rotations(turns, weights)
-        height.append(place[..., 2] + lowest_point(turn, limb, SHARP) - ground)
+        height.append(place[..., 2] + lowest_point(turn, limb, SOFTMIN_WIDTH) - ground)
         place = np.concatenate([place, place[:1]])[..., :2]
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
-        over_ground = yawed(angle, np.concatenate([turn, turn[:1]]))
-        moves.append(contact_moves(turned(angle, place) + shift, over_ground, heading, limb))
+        over_ground = rotate_about_vertical(angle, np.concatenate([turn, turn[:1]]))
+        moves.append(contact_moves(rotate_in_plane(angle, place) + shift, over_ground, heading, limb))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)
 
 
 def _clip_end(channels: Array, limbs: Sequence[Limb], j: int) -> tuple[Array, Array]:
     """End of limb j in each clip: position and λ (n, m, 4), and orientation (n, m, 4)."""
-    at, column = channels.shape[2] - END * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
-    return channels[..., at : at + END], channels[..., column : column + 4]
+    at, column = channels.shape[2] - N_END_CHANNELS * (len(limbs) - j), 3 + 4 * limbs[j].joints[2]
+    return channels[..., at : at + N_END_CHANNELS], channels[..., column : column + 4]
 
 
 def _clip_sole_height(channels: Array, limbs: Sequence[Limb], j: int) -> Array:
     end, turn = _clip_end(channels, limbs, j)
-    return end[..., 2] + lowest_point(turn, limbs[j], SHARP)
+    return end[..., 2] + lowest_point(turn, limbs[j], SOFTMIN_WIDTH)
 
 
 def _mixture_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array) -> Array:
@@ -183,18 +183,20 @@ def _mixture_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], 
     raised = np.maximum(0.0, _extra_clearance(lift) - own_raise)
     up = flight + lift + raised
     highest = up.max(axis=0)
-    stance = np.minimum(STANDS, _MAX_STANCE_FRACTION * highest)
-    free = smooth_steps((up - stance) / np.maximum(np.minimum(SWINGS, _MAX_SWING_FRACTION * highest) - stance, 1e-6))
+    stance = np.minimum(STANCE_HEIGHT, _MAX_STANCE_FRACTION * highest)
+    free = smooth_steps(
+        (up - stance) / np.maximum(np.minimum(SWING_HEIGHT, _MAX_SWING_FRACTION * highest) - stance, 1e-6)
+    )
     # A foot that the clips do not lift follows the mean.
     hold = smooth_steps(highest / _FULL_HOLD_LIFT)
     free = 1.0 - hold * (1.0 - free)
     rate = np.maximum(CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
     slips = (1.0 - free)[..., None] * feet.moves
-    ahead = gap(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])
+    ahead = accumulated_slip(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])
     result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))
     for j in range(len(limbs)):
         at = ROOT + FOOT * j
-        result[..., at : at + 2] = turned(-feet.angles[:-1, :, j], -ahead[:, :, j, :2])
+        result[..., at : at + 2] = rotate_in_plane(-feet.angles[:-1, :, j], -ahead[:, :, j, :2])
         result[..., at + 2] = (up - feet.height)[..., j]
         result[..., at + 3] = -ahead[:, :, j, 2]
     return result

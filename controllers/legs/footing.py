@@ -24,12 +24,12 @@ from numba import njit
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
-from controllers.legs.sole_heights import STANDS
+from controllers.legs.sole_heights import STANCE_HEIGHT
 from controllers.rotations import multiply, rotate
 from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
-# [m] height of the sole above which σ₀ is 0; up to `STANDS` it is 1. In the example at `_MAX_OFFSET` feet slide
+# [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
 # 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWINGS`) 0.4 cm and with 12 mm 0.9 cm.
 _SWING_HEIGHT = 0.006
 # Σ w² above which μ falls, and where it is 0: for two clips, weights 0.72 and 0.985
@@ -43,7 +43,7 @@ _MAX_OFFSET, _MAX_TURN = 0.15, 0.8
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
 _REVERSAL_ANGLE = 0.15  # [rad] backward motion after which the hand's direction counts as reversed
 _MAX_ANGLE_STEP = 1.0  # [rad] larger than any change of the hand's angle in one tick
-_DIRECTION, _BEHIND, _ANGLE, _ENDS = range(4)
+_DIRECTION, _BACKTRACK, _ANGLE, _ENDS = range(4)
 _OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _END_SIZE = 0, 3, 5, 9, 10, 11  # of each end
 
 
@@ -55,7 +55,7 @@ def fresh_footing(limbs: int) -> Array:
 
 
 def packed_soles(limbs: Sequence[Limb]) -> Array:
-    """Sole points of limbs, relative to their centre [m], packed one after the other for `keep_footing`.
+    """Sole points of limbs, relative to their centre [m], packed one after the other for `hold_stance_foot`.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _step_down(x: float, low: float, high: float) -> float:
 
 
 @njit
-def go_on(footing: Array, angle: float) -> float:
+def advance_hand(footing: Array, angle: float) -> float:
     """Store the angle of the hand; returns its step [rad] in the hand's current direction, negative if backwards."""
     step = angle - footing[_ANGLE]
     footing[_ANGLE] = angle
@@ -82,14 +82,14 @@ def go_on(footing: Array, angle: float) -> float:
         return 0.0
     step -= 2.0 * np.pi * np.round(step / (2.0 * np.pi))
     ahead = footing[_DIRECTION] * step
-    footing[_BEHIND] = max(footing[_BEHIND] - ahead, 0.0)
-    if footing[_BEHIND] > _REVERSAL_ANGLE:
-        footing[_DIRECTION], footing[_BEHIND] = -footing[_DIRECTION], 0.0
+    footing[_BACKTRACK] = max(footing[_BACKTRACK] - ahead, 0.0)
+    if footing[_BACKTRACK] > _REVERSAL_ANGLE:
+        footing[_DIRECTION], footing[_BACKTRACK] = -footing[_DIRECTION], 0.0
     return ahead
 
 
 @njit
-def mixed(weights: Array) -> float:
+def mixing_degree(weights: Array) -> float:
     """μ of weights (m,): 1 for a mixture, 0 for a clip alone."""
     square = 0.0
     for w in weights:
@@ -114,7 +114,7 @@ def _yaw(angle: float, q: Array) -> tuple[float, float, float, float]:
 
 
 @njit
-def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
+def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     footing: Array, limb: int, ahead: float, mixture: float, sole: Array, ground: float, frame: Array, end: Array,
     q: Quat,
 ) -> None:  # fmt: skip
@@ -127,7 +127,7 @@ def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     limb : int
         Number of the limb.
     ahead : float
-        Step of the hand (`go_on`) [rad].
+        Step of the hand (`advance_hand`) [rad].
     mixture : float
         μ.
     sole : Array, shape (k, 3)
@@ -147,7 +147,7 @@ def keep_footing(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     turn = _yaw(frame[2] + state[_OFFSET + 2], q)
     low = _turn_sole(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stance = _step_down(end[2] + low - ground, STANDS, _SWING_HEIGHT)
+    stance = _step_down(end[2] + low - ground, STANCE_HEIGHT, _SWING_HEIGHT)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MAX_OFFSET**2 + (state[_OFFSET + 2] / _MAX_TURN) ** 2
     hold = stance * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0

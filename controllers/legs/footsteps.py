@@ -22,14 +22,14 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.legs.footing import packed_soles
-from controllers.legs.limbs import CENTRE, FIRST, LIMB, OFFSETS, Limb
-from controllers.motion.inertialization import offset_left, stopping_way
+from controllers.legs.limbs import CENTRE, FIRST, LIMB_SIZE, OFFSETS, Limb
+from controllers.motion.inertialization import decaying_offset, stopping_distance
 from controllers.motion.vectors import Vector, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate
 from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
-THROW = 20.0
+MAX_CONTINUED_ACCELERATION = 20.0
 """Largest linear acceleration of the old motion that is continued in a change, of the root and of feet [m/s²]: a hand
 that is thrown plays its clip very fast. Half or twice this value for feet changes joint speeds by at most 1 rad/s in 8
 ms in the changes and stops described at `_LIFT_RATIO`."""
@@ -48,7 +48,7 @@ _STANCE_URGENCY = 1e3
 # slide at most 1.3 cm in these changes instead of 2.9, and are at most 9 cm in the air in the stops instead of 12; with
 # twice 17 cm.
 _MAX_STOPPING_DISTANCE = 0.12
-_MAX_ANGULAR_ACCELERATION = 100.0  # [rad/s²] as `THROW`, for the rotation of a foot
+_MAX_ANGULAR_ACCELERATION = 100.0  # [rad/s²] as `MAX_CONTINUED_ACCELERATION`, for the rotation of a foot
 # [s] least stopping time of a foot: half or twice it changes joint speeds in these changes by at most 2 rad/s in 8 ms.
 _MIN_STOPPING_TIME = 0.05
 # A row of `steps`: begin of the step [s]; position (3) and quaternion (4) at which the old motion comes to rest;
@@ -78,7 +78,7 @@ def lever(limb: Array, at: int, segment: Array) -> Vector:
 def sole_height(limb: Array, end: Array) -> float:
     """Height of the lowest sole point of a limb's end with pose `end` (7,) [m]."""
     least = np.inf
-    for k in range(LIMB, limb.shape[0], 3):
+    for k in range(LIMB_SIZE, limb.shape[0], 3):
         least = min(least, lever(limb, k, end)[2])
     return end[2] + least
 
@@ -99,7 +99,7 @@ def limb_end(limb: Array, pose: Pose, end: Array) -> None:
 
 
 @njit
-def _come_to_rest(values: Array, period: float, seconds: float, bound: float, rest: Array, change: Array) -> None:
+def _stopping_motion(values: Array, period: float, seconds: float, bound: float, rest: Array, change: Array) -> None:
     """Rest position `rest` (3,) of a motion, and its offset from there with rates, `change` (3, 3); both written.
 
     `values` (3, 3) are its samples now, a period before and a period after. Each component of its acceleration is
@@ -109,7 +109,7 @@ def _come_to_rest(values: Array, period: float, seconds: float, bound: float, re
         change[1, i] = 0.5 * (values[2, i] - values[1, i]) / period
         gain = (values[2, i] - 2.0 * values[0, i] + values[1, i]) / period**2
         change[2, i] = min(max(gain, -bound), bound)
-        change[0, i] = -stopping_way(change[1, i], change[2, i], seconds)
+        change[0, i] = -stopping_distance(change[1, i], change[2, i], seconds)
         rest[i] = values[0, i] - change[0, i]
 
 
@@ -197,18 +197,25 @@ def plan_steps(
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _MAX_STOPPING_DISTANCE / max(speed, 1e-9), _MIN_STOPPING_TIME))
         step[_STOP], step[FLOOR] = stop, ground
-        _come_to_rest(ends[:, :3], period, stop, THROW, step[_POSITION:_TURN], step[_SHIFT:_TURN_SHIFT].reshape(3, 3))
+        _stopping_motion(
+            ends[:, :3],
+            period,
+            stop,
+            MAX_CONTINUED_ACCELERATION,
+            step[_POSITION:_TURN],
+            step[_SHIFT:_TURN_SHIFT].reshape(3, 3),
+        )
         w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
         change = step[_TURN_SHIFT:_STOP].reshape(3, 3)
-        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
+        _stopping_motion(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
         step[_TURN:_SHIFT] = multiply(w, x, y, z, *exponential(rest[0], rest[1], rest[2]))
         # Again relative to the rest orientation, since rotation vectors do not add exactly.
         w, x, y, z = step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3]
         for j in range(3):
             turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
-        _come_to_rest(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
+        _stopping_motion(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
         change[0] = turns[0]
         limb_end(limbs[n], asked, ends[1])
         urgency[n] = np.floor(height / _HEIGHT_TOLERANCE) + np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])
@@ -230,13 +237,13 @@ def step_end(limb: Array, step: Array, s: float, seconds: float, end: Array) -> 
     left, floor = work_array(3), min(step[FLOOR], sole_height(limb, end))
     # The remaining motion of the old swing counts as length of the step too, or the foot would scrape the floor.
     square = step[_SHIFT] ** 2 + step[_SHIFT + 1] ** 2
-    offset_left(step[_SHIFT:_TURN_SHIFT].reshape(3, 3), stop, min(s, stop), left)
+    decaying_offset(step[_SHIFT:_TURN_SHIFT].reshape(3, 3), stop, min(s, stop), left)
     for i in range(3):
         old = step[_POSITION + i] + left[i]
         ahead = end[i] - old
         square += ahead * ahead if i < 2 else 0.0
         end[i] = old + share * ahead
-    offset_left(step[_TURN_SHIFT:_STOP].reshape(3, 3), stop, min(s, stop), left)
+    decaying_offset(step[_TURN_SHIFT:_STOP].reshape(3, 3), stop, min(s, stop), left)
     w, a, b, c = multiply(
         step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3], *exponential(left[0], left[1], left[2])
     )

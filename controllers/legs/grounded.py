@@ -16,9 +16,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
 
-from controllers.curves.splines import round_lap
+from controllers.curves.splines import periodic_interpolation
 from controllers.legs.cyclic_runs import runs
-from controllers.legs.limbs import END, Limb
+from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.reaching import extension, shortfall
 from controllers.motion.channels import signed_like
 from controllers.state import Array, Mask
@@ -56,21 +56,21 @@ def grounded(
     n, result = len(rows), rows.copy()
     twice = np.concatenate([rows, signs * rows, rows[:1]])
     spline = CubicSpline(np.arange(2 * n + 1), twice, bc_type="periodic")
-    first = rows.shape[1] - END * len(limbs)
+    first = rows.shape[1] - N_END_CHANNELS * len(limbs)
     for j, (limb, warp) in enumerate(zip(limbs, warps, strict=True)):
         assert warp is not None
         joints = [np.arange(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints]
-        columns = np.concatenate([*joints, np.arange(first + END * j, first + END * (j + 1))])
+        columns = np.concatenate([*joints, np.arange(first + N_END_CHANNELS * j, first + N_END_CHANNELS * (j + 1))])
         result[:, columns] = spline(np.mod(warp, 2 * n))[:, columns]
         for joint in joints:
             result[:, joint] /= np.linalg.norm(result[:, joint], axis=1, keepdims=True)
             # The same sign as in the clip, so that both forms can be blended.
             result[:, joint] = signed_like(result[:, joint], rows[:, joint])
-        result[:, first + END * j + 3] += (warp - np.arange(n)) / n
-    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(n) / n)
+        result[:, first + N_END_CHANNELS * j + 3] += (warp - np.arange(n)) / n
+    result[:, :2] += periodic_interpolation(sway, 2.0 * np.pi * np.arange(n) / n)
     short = np.zeros(n)
     for j, limb in enumerate(limbs):
-        at = first + END * j
+        at = first + N_END_CHANNELS * j
         # The leg may be as straight as it gets in the clip.
         short = np.maximum(short, shortfall(result, stride, limb, at, extension(rows, stride, limb, at)))
     width = max(3, round(n / len(flights)))
@@ -82,7 +82,7 @@ def grounded(
     return result
 
 
-def hastened(standing: Mask) -> float:
+def max_swing_speed_ratio(standing: Mask) -> float:
     """Largest ψ' of limbs with the stance mask `standing` (n, limbs): ratio of a limb's swing speed to the clip's."""
     flights, n = runs(~np.any(standing, axis=1)), len(standing)
     warps = [_phase_warp(standing, j, flights) for j in range(standing.shape[1])]

@@ -16,7 +16,7 @@ from numba import njit
 
 from controllers.easing import smooth_step, smooth_step_slope
 from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
-from controllers.saturation import clamped
+from controllers.saturation import soft_clamp
 from controllers.state import Array, Quat
 
 SATURATION_WIDTH = 0.1  # [rad] excess over a limit from which the joint stays at half of it beyond the limit
@@ -26,14 +26,14 @@ _GROUND_HEIGHT, _AIR_HEIGHT = 0.15, 0.35
 
 
 @njit
-def in_the_air(height: float) -> tuple[float, float]:
+def height_weight(height: float) -> tuple[float, float]:
     """A of an end at a height over the ground [m], and its derivative [1/m]."""
     x = (height - _GROUND_HEIGHT) / (_AIR_HEIGHT - _GROUND_HEIGHT)
     return smooth_step(x), smooth_step_slope(x) / (_AIR_HEIGHT - _GROUND_HEIGHT)
 
 
 @njit
-def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int) -> None:
+def saturate_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int) -> None:
     """Saturate a joint near its limits.
 
     Parameters
@@ -49,14 +49,14 @@ def hold_joint(limits: Array, height: Array, q: Quat, rate: Array, tangents: int
     tangents : int
         k, or 0 to leave the rates unchanged.
     """
-    air, rise = in_the_air(height[0])
+    air, rise = height_weight(height[0])
     if air == 0.0:
         return
     x, y, z = logarithm(q[0], q[1], q[2], q[3])
     (cx, sx), (cy, sy), (cz, sz) = (
-        clamped(x, limits[0, 0], limits[0, 1], SATURATION_WIDTH),
-        clamped(y, limits[1, 0], limits[1, 1], SATURATION_WIDTH),
-        clamped(z, limits[2, 0], limits[2, 1], SATURATION_WIDTH),
+        soft_clamp(x, limits[0, 0], limits[0, 1], SATURATION_WIDTH),
+        soft_clamp(y, limits[1, 0], limits[1, 1], SATURATION_WIDTH),
+        soft_clamp(z, limits[2, 0], limits[2, 1], SATURATION_WIDTH),
     )
     if cx == x and cy == y and cz == z:
         return

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.legs.limbs import END, Limb
-from controllers.motion.channels import continuous
-from controllers.motion.loops import plane_exponential, turned, yawed
+from controllers.legs.limbs import N_END_CHANNELS, Limb
+from controllers.motion.channels import with_continuous_signs
+from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
 from controllers.state import Array
 
-SHARP = 5e-4
+SOFTMIN_WIDTH = 5e-4
 """Softness of the minimum of sole heights when feet are planted or the ground is estimated [m]: four points at equal
 height count as 0.7 mm (ln 4 times the softness) lower."""
 
@@ -34,7 +34,7 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
         turn = turn * _joint_rotations(channels, joint)
     place = place + turn.apply(limb.points.mean(axis=0))
     quaternions = turn.as_quat(scalar_first=True).reshape(n, m, 4)
-    return place.reshape(n, m, 3), continuous(quaternions)
+    return place.reshape(n, m, 3), with_continuous_signs(quaternions)
 
 
 def lowest_point(quaternions: Array, limb: Limb, softness: float) -> Array:
@@ -60,13 +60,13 @@ def contact_moves(places: Array, quaternions: Array, headings: Array, limb: Limb
     Returns
     -------
     Array, shape (n - 1, k, 3)
-        Displacement (x, y) of the points, weighted towards the lowest (`SHARP`), without the part due to the turn about
-        the vertical, [m]; and that turn [rad].
+        Displacement (x, y) of the points, weighted towards the lowest (`SOFTMIN_WIDTH`), without the part due to the
+        turn about the vertical, [m]; and that turn [rad].
     """
     turn = Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True)
     offsets = limb.points - limb.points.mean(axis=0)
     levers = np.stack([turn.apply(p).reshape(*headings.shape, 3) for p in offsets], axis=-2)
-    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / SHARP)
+    weights = np.exp((levers[..., 2].min(axis=-1, keepdims=True) - levers[..., 2]) / SOFTMIN_WIDTH)
     weights /= weights.sum(axis=-1, keepdims=True)
     share, lever = 0.5 * (weights[1:] + weights[:-1])[..., None], 0.5 * (levers[1:] + levers[:-1])
     turning = np.diff(headings, axis=0)
@@ -140,9 +140,9 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     """
     place, quaternions = end_poses(channels, limb)
     shift, angle = plane_exponential(lag[:, None, None] * drifts)
-    place[..., :2] = turned(-angle, place[..., :2] - shift)
+    place[..., :2] = rotate_in_plane(-angle, place[..., :2] - shift)
     lags = np.broadcast_to(lag[:, None, None], (*place.shape[:2], 1))
-    return yawed(-angle, quaternions), np.concatenate([place, lags], axis=2)
+    return rotate_about_vertical(-angle, quaternions), np.concatenate([place, lags], axis=2)
 
 
 def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array | None = None) -> Array:
@@ -195,11 +195,11 @@ def lowest_of_limbs(channels: Array, limbs: Sequence[Limb], softness: float) -> 
     -------
     Array, shape (n, m)
     """
-    first, heights = channels.shape[2] - END * len(limbs), list[Array]()
+    first, heights = channels.shape[2] - N_END_CHANNELS * len(limbs), list[Array]()
     for n, limb in enumerate(limbs):
         column = 3 + 4 * limb.joints[2]
         low = lowest_point(channels[..., column : column + 4], limb, softness)
-        heights.append(channels[..., first + END * n + 2] + low)
+        heights.append(channels[..., first + N_END_CHANNELS * n + 2] + low)
     return np.min(heights, axis=0)
 
 
@@ -208,4 +208,4 @@ def grounds(channels: Array, limbs: Sequence[Limb]) -> Array:
 
     `channels` and `limbs` are as in `lowest_of_limbs`.
     """
-    return np.quantile(lowest_of_limbs(channels, limbs, SHARP), _GROUND_QUANTILE, axis=0)
+    return np.quantile(lowest_of_limbs(channels, limbs, SOFTMIN_WIDTH), _GROUND_QUANTILE, axis=0)

@@ -22,7 +22,7 @@ from numba import njit
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.legs.joint_limits import hold_joint
+from controllers.legs.joint_limits import saturate_joint
 from controllers.motion.vectors import (
     Vector,
     cross,
@@ -40,9 +40,9 @@ from controllers.state import Array, Vec3
 
 # A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
 # points, limits (3, 3, 2); for a limb that steps, the points of its sole follow (`footsteps`).
-FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB = 0, 1, 2, 3, 12, 15, 18, 36
+FIRST, MIDDLE, LAST, OFFSETS, AXIS, CENTRE, _LIMITS, LIMB_SIZE = 0, 1, 2, 3, 12, 15, 18, 36
 THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # offsets of the middle and the last joint: the limb's two segments
-END = 4  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`)
+N_END_CHANNELS = 4  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`)
 
 _SATURATION_FLEXION = 0.2  # [rad] flexion below which the correction saturates
 _MIN_FLEXION = 0.03  # [rad] least flexion, for a target out of reach
@@ -85,10 +85,10 @@ class Limb:
 
     def __post_init__(self) -> None:
         numbers = self.packed()
-        if numbers.shape != (LIMB,) or not np.isfinite(numbers).all():
+        if numbers.shape != (LIMB_SIZE,) or not np.isfinite(numbers).all():
             raise ParameterError(
-                f"a limb has {LIMB} finite numbers (joints 3, offsets 3 × 3, axis 3, centre 3, limits 3 × 3 × 2), got "
-                f"{numbers.tolist()}"
+                f"a limb has {LIMB_SIZE} finite numbers (joints 3, offsets 3 × 3, axis 3, centre 3, limits 3 × 3 × 2), "
+                f"got {numbers.tolist()}"
             )
         if not (self.limits[..., 0] <= self.limits[..., 1]).all():
             raise ParameterError(f"the limits of a limb's joints must increase, got {self.limits.tolist()}")
@@ -146,7 +146,7 @@ def _angular_velocity(scalar: float, vector: Vector, norm: float, d_scalar: floa
 
 
 @njit
-def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
+def solve_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Array, tangents: int) -> None:
     """Correct the joints of a limb so that its end has the given pose.
 
     Parameters
@@ -220,7 +220,7 @@ def place_limb(limb: Array, rotations: Array, rates: Array, root: Array, end: Ar
             rates[first, i, k], rates[second, i, k], rates[last, i, k] = w_first[i], w_second[i], w_last[i]
     for i in range(4):
         rotations[first, i], rotations[second, i], rotations[last, i] = n_first[i], n_second[i], n_last[i]
-    limits = limb[_LIMITS:LIMB].reshape(3, 3, 2)
+    limits = limb[_LIMITS:LIMB_SIZE].reshape(3, 3, 2)
     for n in range(3):
         joint = int(limb[n])
-        hold_joint(limits[n], end[:, 2], rotations[joint], rates[joint], tangents)
+        saturate_joint(limits[n], end[:, 2], rotations[joint], rates[joint], tangents)

@@ -22,15 +22,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.curves.splines import round_lap
+from controllers.curves.splines import periodic_interpolation
 from controllers.easing import smooth_steps
 from controllers.legs.cyclic_runs import runs
-from controllers.legs.footfalls import CATCH_UP, gap
-from controllers.legs.limb_ends import SHARP, contact_moves, end_channels, lowest_point
-from controllers.legs.limbs import END, Limb
-from controllers.legs.reaching import reached, shortfall
+from controllers.legs.footfalls import CATCH_UP, accumulated_slip
+from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, end_channels, lowest_point
+from controllers.legs.limbs import N_END_CHANNELS, Limb
+from controllers.legs.reaching import shortfall, solve_reach
 from controllers.motion.channels import signed_like
-from controllers.motion.loops import plane_exponential, turned, yawed
+from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
 from controllers.state import Array, Mask
 
 # Fraction of a swing at each end over which g rises. Half of it, or half a swing, changes the foot slide of eight led
@@ -57,7 +57,7 @@ _LYING_COMPONENT, _UPRIGHT_COMPONENT = 0.7, 0.95
 _FLAT_SLOPE = 0.05
 
 
-def window(mask: Mask, rise: float, longest: float = np.inf) -> Array:
+def smooth_mask(mask: Mask, rise: float, longest: float = np.inf) -> Array:
     """Smooth version of a cyclic mask: 0 outside its runs, 1 within, rising over a share of each run at its ends; C².
 
     The rise takes at most `longest` samples.
@@ -96,7 +96,11 @@ def planted_ends(
     ends : Array, shape (n, 4)
         Position (3) and λ.
     """
-    n, hold, free = len(channels), window(stands, _STANCE_EDGE_FRACTION), window(~stands, _SWING_EDGE_FRACTION)
+    n, hold, free = (
+        len(channels),
+        smooth_mask(stands, _STANCE_EDGE_FRACTION),
+        smooth_mask(~stands, _SWING_EDGE_FRACTION),
+    )
     if stands.all() or not stands.any():
         # Without swing, or without stance, the phase advances uniformly.
         free = np.ones(n)
@@ -104,21 +108,23 @@ def planted_ends(
     lag -= lag.mean()
     turns, all_ends = end_channels(channels[:, None], drift[None], limb, lag)
     quaternions, ends = _level_end(turns[:, 0], limb, 1.0 - free), all_ends[:, 0]
-    heights = ends[:, 2] + lowest_point(quaternions, limb, SHARP) - radius
+    heights = ends[:, 2] + lowest_point(quaternions, limb, SOFTMIN_WIDTH) - radius
     # Over the ground, for one lap: the last sample is the first one a lap later.
     shift, angle = plane_exponential((np.arange(n + 1) / n + np.append(lag, lag[0]))[:, None] * drift)
-    places = turned(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
+    places = rotate_in_plane(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
     # First the heading, then the position, since the roll of a foot depends on its heading.
     for mask in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
-        over_ground = yawed(angle, np.concatenate([quaternions, quaternions[:1]]))
+        over_ground = rotate_about_vertical(angle, np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
         moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb)[:, 0]
-        ahead = mask * gap(hold[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
-        ends[:, :2] -= turned(-angle[:-1], ahead[:, :2])
-        quaternions = yawed(-ahead[:, 2], quaternions)
+        ahead = mask * accumulated_slip(hold[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
+        ends[:, :2] -= rotate_in_plane(-angle[:-1], ahead[:, :2])
+        quaternions = rotate_about_vertical(-ahead[:, 2], quaternions)
     level = levels(heights, stands)
-    low = (1.0 - window(stands, _SETTLING_RATIO, _MAX_SETTLING_TIME * n / duration)) * _soft_max(0.0, heights - level)
-    ends[:, 2] += low + window(~stands, _LIFT_EDGE_FRACTION) * (_soft_max(_MIN_CLEARANCE, low) - low) - heights
+    low = (1.0 - smooth_mask(stands, _SETTLING_RATIO, _MAX_SETTLING_TIME * n / duration)) * _soft_max(
+        0.0, heights - level
+    )
+    ends[:, 2] += low + smooth_mask(~stands, _LIFT_EDGE_FRACTION) * (_soft_max(_MIN_CLEARANCE, low) - low) - heights
     return quaternions, ends
 
 
@@ -197,12 +203,12 @@ def with_planted_ends(  # noqa: PLR0913 - a clip, its limbs and its lap, each of
     """
     first, result, short = channels.shape[1], rows.copy(), list[Array]()
     result[:, 0] *= stride / drift[0]
-    result[:, :2] += round_lap(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
+    result[:, :2] += periodic_interpolation(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
     for j, limb in enumerate(limbs):
-        at, column = first + END * j, 3 + 4 * limb.joints[2]
+        at, column = first + N_END_CHANNELS * j, 3 + 4 * limb.joints[2]
         quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
-        result[:, column : column + 4], result[:, at : at + END] = quaternions, ends
+        result[:, column : column + 4], result[:, at : at + N_END_CHANNELS] = quaternions, ends
         short.append(shortfall(result, stride, limb, at))
     # By a constant: vertical motion of the root would change the ground reaction forces.
     result[:, 2] -= np.max(short)
-    return reached(result, stride, limbs)
+    return solve_reach(result, stride, limbs)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from controllers.legs.limbs import END, Limb
+from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.motion.channels import signed_like
 from controllers.state import Array
 
@@ -46,18 +46,18 @@ def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 
     return np.maximum(0.0, -line[:, 2] - np.sqrt(np.maximum(longest**2 - horizontal**2, 0.0)))
 
 
-def reached(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
+def solve_reach(rows: Array, stride: float, limbs: Sequence[Limb]) -> Array:
     """Channels (n, nq + 4 limbs) with the first two joints of each limb solved so that its last joint meets its end.
 
     The middle joint turns about its flexion axis, to the side to which it is bent on average; the first joint turns
     the shortest way.
     """
-    result, first = rows.copy(), rows.shape[1] - END * len(limbs)
+    result, first = rows.copy(), rows.shape[1] - N_END_CHANNELS * len(limbs)
     for j, limb in enumerate(limbs):
         columns = [slice(3 + 4 * joint, 7 + 4 * joint) for joint in limb.joints[:2]]
         upper, middle = (Rotation.from_quat(rows[:, column], scalar_first=True) for column in columns)
         root = Rotation.from_quat(rows[:, 3:7], scalar_first=True)
-        line = root.inv().apply(_limb_vector(rows, stride, limb, first + END * j))
+        line = root.inv().apply(_limb_vector(rows, stride, limb, first + N_END_CHANNELS * j))
         a, b = limb.offsets[1:]
         axis = np.asarray(limb.axis) / np.linalg.norm(limb.axis)
         # |line|² = |a|² + |b|² + 2 (a·b_axis + B cos δ + C sin δ), with b turned by δ about the axis.

@@ -5,14 +5,14 @@ foot that is held only up to a lower height than it is measured skates in betwee
 height at which tracking releases it is held back.
 """
 
-STANDS = 0.003
+STANCE_HEIGHT = 0.003
 """Height up to which a sole is in stance: its foot keeps its place, and any motion over the floor is skate [m].
 
 In-betweens of cheer and ginga slide by at most 1.0 cm, also with half or twice this height. If skate is measured up to
 twice this height, the low swing of walk and run counts as skate: 7.8 cm instead of 0.4; up to half of it, 0.1 cm.
 """
 
-SWINGS = 0.008
+SWING_HEIGHT = 0.008
 """Height above which a sole is in swing: the tracking figure no longer holds its foot on the floor [m].
 
 With half or twice this height in tracking alone, the residual of a jump is 2.9 or 6.3 % of weight instead of 2.8."""

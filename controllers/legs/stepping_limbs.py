@@ -16,7 +16,7 @@ from numba import njit
 
 from controllers.easing import smooth_step
 from controllers.legs.footsteps import FLOOR, lever, sole_height
-from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB, MIDDLE, OFFSETS, SHANK, THIGH, place_limb
+from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB_SIZE, MIDDLE, OFFSETS, SHANK, THIGH, solve_limb
 from controllers.motion.vectors import cross, dot, product, turned_back, vector_at
 from controllers.rotations import exponential, multiply
 from controllers.state import Array, Pose
@@ -47,7 +47,7 @@ _HYPEREXTENSION_SCALE = 0.04  # [rad] a in `_reduce_hyperextension`: twice the l
 
 @njit
 def _reduce_hyperextension(limb: Array, rotations: Array) -> None:
-    """Reduce hyperextension of a limb's middle joint to a small angle; `place_limb` would take it for flexion.
+    """Reduce hyperextension of a limb's middle joint to a small angle; `solve_limb` would take it for flexion.
 
     An angle α < 0 becomes α / (1 + (α/a)²), with a C² onset at α = 0.
     """
@@ -79,7 +79,7 @@ def _limb_vector(limb: Array, pose: Pose, end: Array, line: Array) -> float:
 
 
 @njit
-def shortfall(limb: Array, step: Array, pose: Pose, end: Array) -> float:
+def required_root_lowering(limb: Array, step: Array, pose: Pose, end: Array) -> float:
     """Lowering of the root [m] with which a limb reaches its end `end` (7,) unstretched, if that is near the floor."""
     line = work_array(3)
     longest = _EASY_EXTENSION_RATIO * _limb_vector(limb, pose, end, line)
@@ -96,7 +96,7 @@ def _roll(limb: Array, end: Array, along: Array, angle: float) -> None:
     low = sole_height(limb, end)
     point, total = work_array(2), 0.0
     point[:] = 0.0
-    for k in range(LIMB, limb.shape[0], 3):
+    for k in range(LIMB_SIZE, limb.shape[0], 3):
         x, y, _ = lever(limb, k, end)
         weight = np.exp((x * along[0] + y * along[1]) / _EDGE_ROUNDING)
         total += weight
@@ -145,7 +145,7 @@ def _hold_end(limb: Array, pose: Pose, end: Array, share: float) -> None:
 
 
 @njit
-def put_limb(limb: Array, pose: Pose, end: Array, share: float) -> None:
+def solve_stepping_limb(limb: Array, pose: Pose, end: Array, share: float) -> None:
     """Correct the joints of a stepping limb so that its end has the pose `end`, adjusted by `share` (`_hold_end`)."""
     rotations, last = pose[3:].reshape(-1, 4), int(limb[LAST])
     _reduce_hyperextension(limb, rotations)
@@ -153,4 +153,4 @@ def put_limb(limb: Array, pose: Pose, end: Array, share: float) -> None:
     # Twice, since from a straight limb one iteration leaves an error of up to two centimetres.
     for _ in range(2):
         rotations[last] = end[3:]
-        place_limb(limb, rotations, work_array((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)
+        solve_limb(limb, rotations, work_array((0, 3, 0)), pose[:3].reshape(1, 3), end[:3].reshape(1, 3), 0)

@@ -51,7 +51,7 @@ class Capture:
             )
 
 
-def low_passed(channels: Array, duration: float, cutoff: float) -> Array:
+def low_pass(channels: Array, duration: float, cutoff: float) -> Array:
     """Low-passed channels of a lap (n, 3 + 4 k): position and k quaternions.
 
     Parameters

@@ -13,7 +13,7 @@ clips it there): a joint then overshoots by up to 0.2 T ȯ, as if by its inertia
 joint limits; so where 0.16 T ȯ would exceed a largest swing, the terms of ȯ and ö decay within a shorter time of their
 own, for which it equals that swing: the overshoot is then up to 1.24 times the swing.
 
-For the position of the figure on the floor, which need not return, see `stopping_way`.
+For the position of the figure on the floor, which need not return, see `stopping_distance`.
 """
 
 import math
@@ -28,7 +28,7 @@ _OVERSHOOT_RATIO = 0.16
 
 
 @njit
-def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing: float = math.inf) -> None:
+def decaying_offset(change: Array, seconds: float, s: float, offset: Tangent, swing: float = math.inf) -> None:
     """Remaining offset s seconds after the change.
 
     Parameters
@@ -58,10 +58,10 @@ def offset_left(change: Array, seconds: float, s: float, offset: Tangent, swing:
 
 
 @njit
-def stopping_way(speed: float, acceleration: float, seconds: float) -> float:
+def stopping_distance(speed: float, acceleration: float, seconds: float) -> float:
     """Stopping distance T ȯ/2 + T² ö/12 from the rates ȯ, ö to rest within T, with a velocity that is a cubic.
 
-    A new motion that is placed this far ahead is reached without a return: the quintic of `offset_left` is then the
+    A new motion that is placed this far ahead is reached without a return: the quintic of `decaying_offset` is then the
     quartic whose velocity is ȯ (1 − x)² (1 + 2x) + T ö x (1 − x)².
     """
     return seconds * speed / 2.0 + seconds**2 * acceleration / 12.0

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
-from controllers.motion.channels import continuous, normalise
+from controllers.motion.channels import normalise, with_continuous_signs
 from controllers.state import Array
 
 # [m], [rad] a lap that ends nearer to its start has no drift
 _MAX_STILL_LENGTH, _MAX_STILL_ANGLE = 0.02, np.deg2rad(2.0)
 # least vertical component of the pelvis axis at which turns about the vertical are counted
 _MIN_UPRIGHT_COMPONENT = 0.3
-_SEAM = 0.2  # fraction of the lap at each end that may change when an open clip is closed
+_SEAM_FRACTION = 0.2  # fraction of the lap at each end that may change when an open clip is closed
 _CLOSING_TOLERANCE = 0.01  # [m], or components of quaternions: largest difference between the ends of a closed clip
 # [rad/s] RMS of the joints, [m/s] of the root: largest speeds at rest
 _MAX_REST_JOINT_SPEED, _MAX_REST_ROOT_SPEED = 1.5, 0.6
@@ -37,13 +37,13 @@ def plane_exponential(twist: Array) -> tuple[Array, Array]:
     return np.stack([s * x - c * y, c * x + s * y], axis=-1), angle
 
 
-def turned(angle: Array, xy: Array) -> Array:
+def rotate_in_plane(angle: Array, xy: Array) -> Array:
     """Vectors of the plane (..., 2) turned by angles (...)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * xy[..., 0] - s * xy[..., 1], s * xy[..., 0] + c * xy[..., 1]], axis=-1)
 
 
-def yawed(angle: Array, quaternions: Array) -> Array:
+def rotate_about_vertical(angle: Array, quaternions: Array) -> Array:
     """Quaternions (..., 4) turned about the vertical by angles (...): q_z ⊗ q."""
     c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
     w, x, y, z = np.moveaxis(quaternions, -1, 0)
@@ -76,10 +76,12 @@ def _close(s: Array, values: Array, sign: float) -> Array:
     """Close an open motion: move each end half way to the other, so that value, slope and second derivative meet."""
     start, end = _end_derivatives(s, values), _end_derivatives(1.0 - s[::-1], values[::-1])
     gaps = sign * end * [[1.0], [-1.0], [1.0]] - start
-    reach = _SEAM ** np.arange(3)[:, None]
-    first = np.einsum("kn,kc->nc", _hermite(s / _SEAM) * reach, 0.5 * gaps)
+    reach = _SEAM_FRACTION ** np.arange(3)[:, None]
+    first = np.einsum("kn,kc->nc", _hermite(s / _SEAM_FRACTION) * reach, 0.5 * gaps)
     # Seen from the end the parameter runs backwards, which changes the sign of the slope's part.
-    last = np.einsum("kn,kc->nc", _hermite((1.0 - s) / _SEAM) * reach * [[1.0], [-1.0], [1.0]], 0.5 * sign * gaps)
+    last = np.einsum(
+        "kn,kc->nc", _hermite((1.0 - s) / _SEAM_FRACTION) * reach * [[1.0], [-1.0], [1.0]], 0.5 * sign * gaps
+    )
     return values + first - last
 
 
@@ -125,8 +127,8 @@ class Loop:
         parts = [spline(np.mod(self.share * s, float(spline.x[-1]))) for spline in self.splines]
         rotations = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts[1:]]
         shift, angle = plane_exponential(lead[:, None] * self.drift)
-        parts[0][:, :2] = turned(angle, parts[0][:, :2]) + shift
-        rotations[0] = yawed(angle, rotations[0])
+        parts[0][:, :2] = rotate_in_plane(angle, parts[0][:, :2]) + shift
+        rotations[0] = rotate_about_vertical(angle, rotations[0])
         return np.concatenate([parts[0], *rotations], axis=1)
 
 
@@ -148,7 +150,7 @@ def checked_clip(poses: Array, fps: float, name: str) -> Array:
             raise ParameterError(
                 f"{name}: quaternion at number {first} of frame {int(np.abs(norms - 1).argmax())} is not unit"
             )
-        array[:, first : first + 4] = continuous(quaternions / norms)
+        array[:, first : first + 4] = with_continuous_signs(quaternions / norms)
     return array
 
 
@@ -166,7 +168,7 @@ def drift_of(poses: Array) -> Array:
     """ξ of a clip from its first and last frame and the turns between."""
     first, last = poses[0], poses[-1]
     net, turns = turn_of(poses)
-    step = last[:2] - turned(np.array(net), first[:2])
+    step = last[:2] - rotate_in_plane(np.array(net), first[:2])
     if abs(net) < _MAX_STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _MAX_STILL_LENGTH:
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
     if abs(net) < 1.0:
@@ -176,12 +178,12 @@ def drift_of(poses: Array) -> Array:
     return np.append(np.linalg.solve(columns.T, step), angle)
 
 
-def remainder(poses: Array, s: Array, drift: Array) -> Array:
+def periodic_remainder(poses: Array, s: Array, drift: Array) -> Array:
     """ρ and the joints: the poses with the root moved by exp(−s ξ)."""
     rest = poses.copy()
     shift, angle = plane_exponential(s[:, None] * drift)
-    rest[:, :2] = turned(-angle, poses[:, :2] - shift)
-    rest[:, 3:7] = yawed(-angle, poses[:, 3:7])
+    rest[:, :2] = rotate_in_plane(-angle, poses[:, :2] - shift)
+    rest[:, 3:7] = rotate_about_vertical(-angle, poses[:, 3:7])
     return rest
 
 
@@ -189,15 +191,15 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
     """Poses (n, nq) moved over the ground such that the remainder at phases s (n,) is at the origin, facing +x."""
     placed = poses.copy()
     placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
-    w, _, _, z = remainder(placed, s, drift_of(placed))[:, 3:7].T
+    w, _, _, z = periodic_remainder(placed, s, drift_of(placed))[:, 3:7].T
     # Mean heading by the doubled half angle, which is independent of the sign of a quaternion.
     heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
-    placed[:, :2] = turned(np.array(-heading), placed[:, :2])
-    placed[:, 3:7] = yawed(np.full(len(s), -heading), placed[:, 3:7])
+    placed[:, :2] = rotate_in_plane(np.array(-heading), placed[:, :2])
+    placed[:, 3:7] = rotate_about_vertical(np.full(len(s), -heading), placed[:, 3:7])
     return placed
 
 
-def there_and_back(poses: Array, fps: float) -> Array:
+def append_reversal(poses: Array, fps: float) -> Array:
     r"""Append its time reversal to an open clip that (nearly) rests at both ends; return any other clip unchanged.
 
     q(2T − t) has the accelerations of q(t), and velocities enter M q̈ + c(q, q̇) = τ + Jᵀ f by their squares: with
@@ -226,8 +228,8 @@ def there_and_back(poses: Array, fps: float) -> Array:
 
 
 def closed_loop(poses: Array, fps: float) -> Loop:
-    """Loop of a clip; an open clip that nearly rests at both ends is played there and back (`there_and_back`)."""
-    return forward_loop(there_and_back(poses, fps), fps)
+    """Loop of a clip; an open clip that nearly rests at both ends is played there and back (`append_reversal`)."""
+    return forward_loop(append_reversal(poses, fps), fps)
 
 
 def forward_loop(poses: Array, fps: float) -> Loop:
@@ -239,7 +241,7 @@ def forward_loop(poses: Array, fps: float) -> Loop:
     s = np.linspace(0.0, 1.0, len(poses))
     placed = placed_at_origin(poses, s)
     drift = drift_of(placed)
-    rest = remainder(placed, s, drift)
+    rest = periodic_remainder(placed, s, drift)
     splines: list[CubicSpline] = []
     for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:
         values = rest[:, first:stop]

@@ -45,7 +45,7 @@ def strides(loop: Loop) -> int:
     return 1
 
 
-def in_step(loops: Sequence[Loop], lap: float | None = None, apart: bool = False) -> list[Loop]:
+def fit_to_lap(loops: Sequence[Loop], lap: float | None = None, apart: bool = False) -> list[Loop]:
     """The loops, each repeated as often as it fits a lap.
 
     Parameters
@@ -97,5 +97,5 @@ def natural_lap(loops: Sequence[Loop]) -> float:
     fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
     highest = int(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)) / stride + _REPEAT_TOLERANCE)
     laps = stride * np.arange(fewest, max(fewest, highest) + 1)
-    worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in in_step(loops, float(lap))) for lap in laps])
+    worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in fit_to_lap(loops, float(lap))) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

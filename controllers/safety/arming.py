@@ -63,6 +63,6 @@ def next_state(state: int, event: int) -> int:
 
 
 @njit
-def pushes(state: int) -> bool:
+def motors_on(state: int) -> bool:
     """Whether the motors are on."""
     return state in (RAMPING, ACTIVE)

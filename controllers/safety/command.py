@@ -8,7 +8,7 @@ exempt from the slew limit: the force drops to zero at once.
 import numpy as np
 from numba import njit
 
-from controllers.safety.energy_tank import book_force, guard_energy
+from controllers.safety.energy_tank import book_force, limit_power
 from controllers.safety.faults import (
     FAULT_CODE,
     FORCE_NOT_FINITE,
@@ -58,7 +58,7 @@ def command_force(
     # Checked before use, since min(e_max, NaN) would give a full tank.
     if not np.isfinite(np.sum(tank)):
         latch(faults, TANK_NOT_FINITE, t, first_not_finite(tank))
-    guard_energy(budget, tank, p, v, force)
+    limit_power(budget, tank, p, v, force)
     if faults[FAULT_CODE] == 0.0:
         slew_force(limits, limiter, force)
     else:

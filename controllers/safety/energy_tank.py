@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -24,7 +24,7 @@ TANK_ENERGY, TANK_SCALE, TANK_POSITION, TANK_FORCE, TANK_STARTED, TANK_SIZE = 0,
 
 
 @njit
-def guard_energy(params: Array, tank: Array, p: Array, v: Array, force: Array) -> None:
+def limit_power(params: Array, tank: Array, p: Array, v: Array, force: Array) -> None:
     """Book the work of the last period, and scale a force down to the power that the store allows.
 
     Parameters
@@ -66,7 +66,7 @@ def book_force(tank: Array, force: Array) -> None:
         tank[TANK_FORCE + i] = force[i]
 
 
-def renew_tank(tank: Array) -> None:
+def reset_tank(tank: Array) -> None:
     """Make a memory usable after a fault: a non-finite energy is set to zero."""
     if not np.isfinite(tank[TANK_ENERGY]):
         tank[TANK_ENERGY] = 0.0
@@ -104,7 +104,7 @@ class EnergyTank:
     initial: float | None = None
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         for name in ("period", "power", "capacity", "drain_time", "initial"):
             value = getattr(self, name)
             if name == "initial" and value is None:
@@ -120,7 +120,7 @@ class EnergyTank:
             )
 
     def params(self) -> Array:
-        """Parameters of `guard_energy`."""
+        """Parameters of `limit_power`."""
         return np.array([self.power, self.capacity, 1.0 / self.drain_time, self.period])
 
     def fresh_memory(self) -> Array:

@@ -29,8 +29,8 @@ from controllers.safety.arming import (
     RAMPED,
     RAMPING,
     RELEASED,
+    motors_on,
     next_state,
-    pushes,
 )
 from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
 from controllers.safety.limiter import magnitude
@@ -77,7 +77,7 @@ def pass_gate(
     if request == CLEAR and faults[FAULT_CODE] == 0.0:
         gate[GATE_STATE] = next_state(int(gate[GATE_STATE]), CLEAR)
     state = _apply_requests(params, int(gate[GATE_STATE]), request, held, gate[GATE_QUIET])
-    if pushes(state):
+    if motors_on(state):
         _check_motion(params, faults, hand)
         gain = oscillation_gain(shaking, shaken, force)
         if gain < 0.0:
@@ -89,11 +89,11 @@ def pass_gate(
         shaken[OSCILLATION_GAIN] = 1.0
     if faults[FAULT_CODE] != 0.0:
         state = next_state(state, FAULTED)
-    share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP_TIME]) if pushes(state) else 0.0
+    share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP_TIME]) if motors_on(state) else 0.0
     if state == RAMPING and share >= 1.0:
         state = next_state(state, RAMPED)
     gate[GATE_STATE], gate[GATE_SHARE], gate[GATE_GAIN] = state, share, max(0.0, gain)
-    if pushes(state):
+    if motors_on(state):
         _limit_slew(
             params, gate, gain * share * _fade(params, hand) * min(1.0, params[_MAX_FORCE] / max(size, 1e-300)), force
         )

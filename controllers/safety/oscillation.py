@@ -126,7 +126,7 @@ class OscillationDetector:
         return memory
 
 
-def shaken(detector: OscillationDetector, force: Array, memory: list[float]) -> Mask:
+def oscillating_ticks(detector: OscillationDetector, force: Array, memory: list[float]) -> Mask:
     """Ticks of a recorded force at which the detector finds an oscillation, with the gain kept at 1; shape (n,).
 
     Parameters

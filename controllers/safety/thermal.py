@@ -17,7 +17,7 @@ from controllers.state import Array
 
 
 @njit
-def hold_to_heat(
+def limit_by_heat(
     heat: Array, continuous: tuple[float, float, float], peak: tuple[float, float, float], share: float, torque: Array
 ) -> float:
     """Scale joint torques in place to the ceilings that the motors' heat allows, and update the heat.

@@ -6,8 +6,8 @@ phases as in the clip, 1: none, see `controllers.legs.grounded`), changes in sta
 .. math:: u = u_0 + (u_1 - u_0)\,S(x), \qquad S(x) = x^3 (10 - 15 x + 6 x^2)
 
 from its value u_0 at the entry to the value u_1 decided there. If u falls (a flight follows), x goes from 0 to 1 in the
-first share `WITHIN` of the stance, so that the figure pushes off as in its clip; if u rises, in the last share
-`WITHIN`, so that it lands as in its clip. Going back within a stance reverses the change.
+first part of the stance (`TRANSITION_FRACTION`), so that the figure pushes off as in its clip; if u rises, in the last
+part of the same length, so that it lands as in its clip. Going back within a stance reverses the change.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _SHARE, _START_SHARE, _TARGET_SHARE, _ENTRY_END, DECISION = range(5)
 
 # Fraction of a stance over which u changes. If it is smaller, the floor would have to pull on a figure that lands; if
 # larger, on one that pushes off: downward accelerations reach 8 m/s² with 0.8, as in the run itself, and 14 with 0.6.
-WITHIN = 0.8
+TRANSITION_FRACTION = 0.8
 
 
 def fresh_decision(flies: bool) -> Array:
@@ -67,7 +67,11 @@ def decide_flight(decision: Array, share: float, speed: float, take_off: float, 
         decision[_ENTRY_END], decision[_START_SHARE] = np.floor(share + 0.5), decision[_SHARE]
         decision[_TARGET_SHARE] = 0.0 if speed >= (landing if flew else take_off) else 1.0
     x = abs(share - decision[_ENTRY_END])
-    x = min(x / WITHIN, 1.0) if decision[_TARGET_SHARE] < decision[_START_SHARE] else max(1.0 - (1.0 - x) / WITHIN, 0.0)
+    x = (
+        min(x / TRANSITION_FRACTION, 1.0)
+        if decision[_TARGET_SHARE] < decision[_START_SHARE]
+        else max(1.0 - (1.0 - x) / TRANSITION_FRACTION, 0.0)
+    )
     decision[_SHARE] = decision[_START_SHARE] + smooth_step(x) * (decision[_TARGET_SHARE] - decision[_START_SHARE])
     return decision[_SHARE]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.state import LONGEST_STEP, Array
+from controllers.state import MAX_TIME_STEP, Array
 from controllers.walking.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.walking.walked_path import (
     PACKED_PATH,
@@ -245,6 +245,6 @@ def lead(follow: Following, walker: Walker, time: float, x: float, y: float) -> 
     walker.time[0] = time
     # The comparison is false for the NaN of the first tick.
     if dt > 0.0:
-        _integrate_motion(follow, walker, min(dt, LONGEST_STEP))
+        _integrate_motion(follow, walker, min(dt, MAX_TIME_STEP))
         _update_flight(follow, walker)
         _extend_path(follow, walker, x, y)

@@ -30,7 +30,7 @@ _PENDULUM_HEIGHT = (
 _PREVIEW_RATIO = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
 
 
-class Followed(NamedTuple):
+class WalkerState(NamedTuple):
     """State of a walker that a force law reads.
 
     Attributes
@@ -58,13 +58,13 @@ class Followed(NamedTuple):
     room: float
 
 
-FOLLOWED = len(Followed._fields)
+FOLLOWED = len(WalkerState._fields)
 
 
 @njit
-def followed_at(numbers: Array, at: int) -> Followed:
-    """The `Followed` that `follow_hand` wrote at ``numbers[at:]``."""
-    return Followed(
+def followed_at(numbers: Array, at: int) -> WalkerState:
+    """The `WalkerState` that `follow_hand` wrote at ``numbers[at:]``."""
+    return WalkerState(
         numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3], numbers[at + 4], numbers[at + 5],
         numbers[at + 6], numbers[at + 7],
     )  # fmt: skip
@@ -81,7 +81,7 @@ def follow_hand(params: Array, at: int, slot: int, walkers: Array, place: int, h
     params, at
         S and a `Following` lie at ``params[at:]``.
     slot, memory
-        A `Followed` is written to ``memory[slot:]``.
+        A `WalkerState` is written to ``memory[slot:]``.
     walkers, place
         The numbers of the `Walker` lie at ``walkers[place:]``.
     hand : Array, shape (15,)
@@ -95,7 +95,7 @@ def follow_hand(params: Array, at: int, slot: int, walkers: Array, place: int, h
     goal, front = walker.goal[0], path_front(walker.path)
     nearest, beyond = min(goal, front), max(goal - front, 0.0)
     a, b, heading, _ = path_place(walker.path, nearest)
-    followed = Followed(
+    followed = WalkerState(
         s=walker.argument[0], goal=goal, x=a, y=b, heading=heading, along=nearest - walker.argument[0] - follow.ahead,
         beyond=beyond, room=0.5 * follow.curvature * beyond * beyond,
     )  # fmt: skip
@@ -121,7 +121,7 @@ class Walking:
     the path already laid the same bounds limit its speed. Led backwards s decreases; forwards again it increases.
 
     The state is a `controllers.walking.walker.Walker`, which the servo advances before the field (`follow_hand`). The
-    law of force (`controllers.fields.leading`) reads a `Followed` of it, the haptic map (`controllers.haptic_map.led`)
+    law of force (`controllers.fields.leading`) reads its `WalkerState`, the haptic map (`controllers.haptic_map.led`)
     its argument and its path.
 
     Parameters

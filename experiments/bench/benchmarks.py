@@ -22,7 +22,7 @@ from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, HandState, IntArray, stylus_path
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
-from experiments.bench.figures import Figure, print_figures
+from experiments.bench.figures import BenchmarkResult, print_figures
 from experiments.bench.page_cost import picture_microseconds
 from experiments.bench.prepare_cost import prepare_cost
 from experiments.bench.recorder_cost import recorder_cost
@@ -56,66 +56,74 @@ def bench(as_json: bool, check: bool) -> int:
     return print_figures(figures(), as_json, check)
 
 
-def figures() -> Iterator[Figure]:
+def figures() -> Iterator[BenchmarkResult]:
     """Yield every figure with its bounds as it is measured; bounds are ratios within one run.
 
     The unit `mj_steps` is the time of a bare `mj_step` of the demo's world on this machine.
     """
     costs = {name: tick_cost(make()) for name, make in MODES.items()}
     step = costs["follow"].step
-    yield Figure(
+    yield BenchmarkResult(
         "simulated seconds per second, physics and servo at 1 kHz, figure at 500 Hz", STEP / costs["follow"].tick
     )
-    yield Figure("microseconds of a bare mj_step of the world", 1e6 * step)
+    yield BenchmarkResult("microseconds of a bare mj_step of the world", 1e6 * step)
     for name, cost in costs.items():
-        yield Figure(f"a closed-loop tick, {name}", cost.tick / cost.step, "mj_steps", at_most=1.5)
+        yield BenchmarkResult(f"a closed-loop tick, {name}", cost.tick / cost.step, "mj_steps", at_most=1.5)
     default = tick_cost(run_config())
-    yield Figure("simulated seconds per second, default clock", 1e-3 / default.tick)
-    yield Figure("a closed-loop tick of the default clock, two steps", default.tick / default.step, "mj_steps")
+    yield BenchmarkResult("simulated seconds per second, default clock", 1e-3 / default.tick)
+    yield BenchmarkResult("a closed-loop tick of the default clock, two steps", default.tick / default.step, "mj_steps")
     agrees = all(cost.same for cost in (*costs.values(), default))
-    yield Figure("runs whose replayed controls give the same states, bit for bit, of all", float(agrees), at_least=1.0)
+    yield BenchmarkResult(
+        "runs whose replayed controls give the same states, bit for bit, of all", float(agrees), at_least=1.0
+    )
     cost = figure_cost()
-    yield Figure(
+    yield BenchmarkResult(
         "kinematic figure, against the physical one", cost.physical / cost.kinematic, "× as fast", at_least=3.0
     )
-    yield Figure("no figure, against the physical one", cost.physical / cost.none, "× as fast", at_least=5.0)
-    yield Figure("a tick without figure", cost.none / cost.bare_step, "mj_steps of the linkage", at_most=3.0)
+    yield BenchmarkResult("no figure, against the physical one", cost.physical / cost.none, "× as fast", at_least=5.0)
+    yield BenchmarkResult("a tick without figure", cost.none / cost.bare_step, "mj_steps of the linkage", at_most=3.0)
     config = run_config()
     clips, _ = load_clips(config.map.clips)
-    yield Figure("two threads / twice one thread", thread_scaling(lambda: wire(config, clips)), at_least=0.9)
+    yield BenchmarkResult("two threads / twice one thread", thread_scaling(lambda: wire(config, clips)), at_least=0.9)
     recorder = recorder_cost()
-    yield Figure("a run with its recorder, against one without", recorder.ratio, "× the processor time", at_most=1.15)
-    yield Figure("memory after 20 s recorded / before", recorder.grown, at_most=1.02)
+    yield BenchmarkResult(
+        "a run with its recorder, against one without", recorder.ratio, "× the processor time", at_most=1.15
+    )
+    yield BenchmarkResult("memory after 20 s recorded / before", recorder.grown, at_most=1.02)
     small, large = closest_point_microseconds(10), closest_point_microseconds(10_000)
-    yield Figure("closest point, 10 → 10 000 pieces", large / small, "×", at_most=3.0)
+    yield BenchmarkResult("closest point, 10 → 10 000 pieces", large / small, "×", at_most=3.0)
 
-    def in_mj_steps(name: str, microseconds: float, bound: float) -> Figure:
-        return Figure(name, 1e-6 * microseconds / step, "mj_steps", at_most=bound)
+    def in_mj_steps(name: str, microseconds: float, bound: float) -> BenchmarkResult:
+        return BenchmarkResult(name, 1e-6 * microseconds / step, "mj_steps", at_most=bound)
 
     yield in_mj_steps("ten rivers of higher order, with the limiter", tick_microseconds(*heaviest_field()), 0.3)
     yield in_mj_steps("soft walls of 17 joints", walls_microseconds(wire(config, clips)), 0.5)
     yield in_mj_steps("h(p) with h_* over four clips", map_microseconds(wire(config, clips)), 1.0)
     four, ten, hundred = (lifted_microseconds(m) for m in (4, 10, 100))
     yield in_mj_steps("lifted map, h(p) with h_*, four clips near", four, 1.0)
-    yield Figure("lifted map, 10 → 100 clips", hundred / ten, "×", at_most=2.0)
+    yield BenchmarkResult("lifted map, 10 → 100 clips", hundred / ten, "×", at_most=2.0)
     trials = trial_cost()
-    yield Figure("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
-    yield Figure("trials on two threads / twice one", trials.scaling, at_least=0.9)
-    yield Figure("memory after 2000 short trials / after 400", trials.grown, at_most=1.01)
+    yield BenchmarkResult("a study beside its trials, processor time", 100 * trials.overhead, "%", at_most=5.0)
+    yield BenchmarkResult("trials on two threads / twice one", trials.scaling, at_least=0.9)
+    yield BenchmarkResult("memory after 2000 short trials / after 400", trials.grown, at_most=1.01)
     yield in_mj_steps("a picture of the live page", picture_microseconds(wire(config, clips)), 100.0)
     start = libraries_seconds()
-    yield Figure(
+    yield BenchmarkResult(
         "second start of hvf to its first tick", second_start_seconds() / start, "× its libraries", at_most=3.0
     )
-    yield Figure("second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0)
-    yield Figure("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
+    yield BenchmarkResult(
+        "second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0
+    )
+    yield BenchmarkResult("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
     made, verified = certificate_seconds()
     yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
-    yield Figure("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
+    yield BenchmarkResult("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
     yield in_mj_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
     preparing = prepare_cost()
-    yield Figure("preparing captures, processor time", preparing.clip, "× the clips' duration", at_most=6.0)
-    yield Figure("preparing captures, against simulating their figure", preparing.simulating, "× the processor time")
+    yield BenchmarkResult("preparing captures, processor time", preparing.clip, "× the clips' duration", at_most=6.0)
+    yield BenchmarkResult(
+        "preparing captures, against simulating their figure", preparing.simulating, "× the processor time"
+    )
 
 
 def libraries_seconds() -> float:

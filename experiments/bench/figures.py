@@ -7,7 +7,7 @@ from experiments.files.json_text import json_text
 
 
 @dataclass(frozen=True)
-class Figure:
+class BenchmarkResult:
     """A measured ratio.
 
     Attributes
@@ -45,9 +45,9 @@ class Figure:
         return f"{verdict}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{bounds_text}"
 
 
-def print_figures(figures: Iterable[Figure], as_json: bool, check: bool) -> int:
+def print_figures(figures: Iterable[BenchmarkResult], as_json: bool, check: bool) -> int:
     """Print figures as they are measured, or all as JSON; returns the exit code, 1 if `check` is set and one fails."""
-    printed: list[Figure] = []
+    printed: list[BenchmarkResult] = []
     for figure in figures:
         printed.append(figure)
         if not as_json:

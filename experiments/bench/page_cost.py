@@ -11,7 +11,7 @@ from experiments.live.session.messages import SLICE_SIDE
 from experiments.setups.session import Session
 from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 
 PICTURES, WARM = 200, 20  # images that are timed, and drawn before as a warm-up
 
@@ -33,7 +33,7 @@ def picture_microseconds(session: Session) -> float:
             moment = k % 2
             place = np.full(3, 0.01 * moment)
             with server.atomic():
-                stage.show(Shown(0.016 * k, qpos[moment], pose[moment], place, 1.0 + place, 1.0 - place, place))
+                stage.show(Moment(0.016 * k, qpos[moment], pose[moment], place, 1.0 + place, 1.0 - place, place))
                 stage.draw_slice(forces[moment], forces[moment])
         return 1e6 * (time.thread_time() - begin) / PICTURES
     finally:

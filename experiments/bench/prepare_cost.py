@@ -11,7 +11,7 @@ from experiments.preparation.followed import followed
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import plus
+from models.mocap.preparation.poses import add_tangents
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 
@@ -58,4 +58,4 @@ def _add_capture_errors(clip: Clip, rng: np.random.Generator) -> Clip:
     """The clip with smooth random errors of the root and of all joints, so that its ends do not match."""
     scale = np.where(np.arange(N_TANGENT) < 3, _ROOT_ERROR, _JOINT_ERROR)
     errors = gaussian_filter1d(rng.normal(size=(clip.n_frames, N_TANGENT)), _CORRELATION_TIME * clip.fps, axis=0)
-    return Clip(plus(clip.poses, scale * errors / errors.std(axis=0)), clip.fps, clip.name)
+    return Clip(add_tangents(clip.poses, scale * errors / errors.std(axis=0)), clip.fps, clip.name)

@@ -15,12 +15,12 @@ import psutil
 from rich.console import Console
 
 from experiments.config.part import to_json
-from experiments.trials.design.plan import Trial, planned
-from experiments.trials.design.study_config import StudyConfig, study_from
+from experiments.trials.design.plan import Trial, plan_trials
+from experiments.trials.design.study_config import StudyConfig, parse_study
 from experiments.trials.execution.database import Database
-from experiments.trials.execution.drive import run_missing, warm
+from experiments.trials.execution.drive import compile_and_make_maps, run_missing
 from experiments.trials.execution.threads import Threads
-from experiments.trials.trial.run_trial import SHELF, Row, Task
+from experiments.trials.trial.run_trial import MAP_CACHE, Row, Task
 
 _THREAD_COUNT, _SHORT_TIME, _SHORT_COUNT = 2, 0.02, 2_000  # simultaneous trials; short trials: duration [s] and number
 
@@ -56,7 +56,7 @@ def trial_cost() -> TrialCost:
 
 def overhead(users: int, seconds: float, console: Console) -> tuple[float, float]:
     """Processor time of planning, driving and database over that of the trials, and the total time [s]."""
-    warm([trial.config for trial in planned(_make_study(1, 0.1))[:1]], SHELF, console)
+    compile_and_make_maps([trial.config for trial in plan_trials(_make_study(1, 0.1))[:1]], MAP_CACHE, console)
     begin = time.process_time()
     trial_seconds, study_seconds = _run_study(_make_study(users, seconds), Threads(1), console)
     return (time.process_time() - begin) / trial_seconds - 1.0, study_seconds
@@ -95,8 +95,8 @@ def start_seconds() -> float:
 def first_row() -> None:
     """Run the first trial of a study, and print its state."""
     study = _make_study(1, _SHORT_TIME)
-    trial = planned(study)[0]
-    warm([trial.config], SHELF, Console(stderr=True, quiet=True))
+    trial = plan_trials(study)[0]
+    compile_and_make_maps([trial.config], MAP_CACHE, Console(stderr=True, quiet=True))
     print(next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))]))).state, flush=True)
 
 
@@ -105,14 +105,14 @@ def _make_study(users: int, seconds: float) -> StudyConfig:
         "name": "cost", "seconds": seconds, "run": {"figure": "none"}, "users": {"number": users},
         "factors": {"stiffness": [100, 300], "damping": [4, 8]},
     }  # fmt: skip
-    return study_from(values, "cost")
+    return parse_study(values, "cost")
 
 
 def _run_study(study: StudyConfig, executor: Threads, console: Console) -> tuple[float, float]:
     """The trials' own processor time, and the time that the study took [s]."""
     with tempfile.TemporaryDirectory() as folder, Database(Path(folder) / "s.sqlite", "cost", "cost", "") as database:
         begin = time.perf_counter()
-        trials: tuple[Trial, ...] = planned(study)
+        trials: tuple[Trial, ...] = plan_trials(study)
         factors = {trial.key: {"user": trial.meeting.user} for trial in trials}
         run_missing(trials, database, executor, "", console, factors)
         return sum(row.seconds for row in database.rows()), time.perf_counter() - begin

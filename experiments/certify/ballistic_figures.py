@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from controllers.certificates.flight.ballistic import FlightJudgement
-from controllers.certificates.flight.flight_fit import best_fall
+from controllers.certificates.flight.flight_fit import fit_free_fall
 from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 
@@ -77,7 +77,7 @@ def _draw_rates(
     rates = [trial.rate for trial in trials]
     com = ballistics.motion.com[flight.fit.start : flight.fit.end + 1]
     fine_rates = np.geomspace(rates[0], rates[-1], 100)
-    predicted = [100 * best_fall(com, ballistics.motion.fps, float(rate))[0] for rate in fine_rates]
+    predicted = [100 * fit_free_fall(com, ballistics.motion.fps, float(rate))[0] for rate in fine_rates]
     ax.plot(fine_rates, predicted, color="#2f6db3", lw=1.2, label="certificate")
     ax.plot(rates, [100 * trial.distance for trial in trials], "o", ms=4, color="#c2473b", label="physical figure")
     ax.axhline(5.0, color="#566072", lw=0.8, ls="--")

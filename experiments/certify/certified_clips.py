@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.report import FROM_WORST, Verdict
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
-from experiments.results.folder import RECORDING, animated, clips_of, config_of
+from experiments.results.folder import RECORDING, clips_of, config_of, has_animation
 from experiments.results.measures.run_measures import SETTLING
 from experiments.setups.setups import clips_for
 from models.humanoid.skeleton import DEFAULT_STATURE
@@ -55,7 +55,7 @@ def similar(clip: Clip, size: float) -> Clip:
 
 def played(recording: Recording) -> tuple[Clip, ...]:
     """The animation of a recorded run as it was played, after the first second; empty if nothing was animated."""
-    if not animated(recording):
+    if not has_animation(recording):
         return ()
     rate = recording.rates["frames"]
     stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_MAX_DURATION * rate)
@@ -63,7 +63,9 @@ def played(recording: Recording) -> tuple[Clip, ...]:
     return (Clip(poses, rate / stride, PLAYED),) if len(poses) > 1 else ()
 
 
-def certify_clips(clips: Sequence[Clip], judging: Judging = JUDGING, size: float = 1.0) -> dict[str, Verdict]:
+def certify_clips(
+    clips: Sequence[Clip], judging: JudgementCriteria = DEFAULT_CRITERIA, size: float = 1.0
+) -> dict[str, Verdict]:
     """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with a list of all clips.
 
     `size`: lengths of the figure relative to the default one, for which the clips are made [1].

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
 from controllers.curves.trajectory import Trajectory
@@ -20,7 +20,7 @@ from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
-from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, left_out
+from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, uncertified_parts
 from experiments.setups.parts.defaults import resolved
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
@@ -132,7 +132,7 @@ def certificate_inputs(
     hands: HandRange,
     push: float,
     clips: Sequence[Clip] = (),
-    judging: Judging = JUDGING,
+    judging: JudgementCriteria = DEFAULT_CRITERIA,
 ) -> dict[str, object]:
     """All data on which the verdicts on a run's field depend, by name, for `hash_of`.
 
@@ -155,7 +155,7 @@ def certificate_inputs(
     return {
         # All parameters of all laws, including those that no certificate covers.
         "gains": (certified_laws(config), resolved(config).mode),
-        "added": config.map if left_out(config) or governor_drag(config) else None,
+        "added": config.map if uncertified_parts(config) or governor_drag(config) else None,
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
         "curve": given_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],

@@ -23,7 +23,7 @@ from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip
 
-QUARTERS = 0.25 * np.pi * np.arange(4)
+DIRECTIONS = 0.25 * np.pi * np.arange(4)
 _ASSUMPTIONS = (
     "k_r is LEADING's k_l, with k_z in proportion; b_d is its b",
     "the figure is frozen: it moves at a speed of its own, at a bound of its speed or its pull; where it follows "
@@ -55,9 +55,9 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
     lead, curvature = field.walking.lead[0], field.walking.curvature
     pull_distance = field.walking.scale * ForceLimiter(1e-3).peak / max(field.k_l, 1e-3)
     near, far = curvature * lead, curvature * (lead + pull_distance)
-    sides = [(sign, heading) for sign in (1.0, -1.0) for heading in QUARTERS[::2].tolist()]
+    sides = [(sign, heading) for sign in (1.0, -1.0) for heading in DIRECTIONS[::2].tolist()]
     return {
-        "": [Regime(False, True, heading=heading) for heading in QUARTERS.tolist()],
+        "": [Regime(False, True, heading=heading) for heading in DIRECTIONS.tolist()],
         "_back": [Regime(True, True)],
         "_aside": [Regime(False, True, True, sign * near, heading) for sign, heading in sides],
         "_beyond": [Regime(True, True, True, sign * far, heading) for sign, heading in sides],
@@ -129,7 +129,7 @@ def leading_energy(field: Leading) -> Verdict:
 
 _FOLLOWING_REGIMES = (
     Regime(True, True),
-    *(Regime(True, False, True, heading=heading) for heading in QUARTERS.tolist()),
+    *(Regime(True, False, True, heading=heading) for heading in DIRECTIONS.tolist()),
 )
 
 

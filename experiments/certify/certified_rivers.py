@@ -15,7 +15,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common, common_lyapunov
-from controllers.certificates.switching.switching import Keeping, Sharing, rival, switching
+from controllers.certificates.switching.switching import HandRetention, SelectionRule, rival, switching
 from controllers.certificates.switching.switching_search import counterexample
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
@@ -119,9 +119,9 @@ def certify_rivers(
     field = law_of(mode, choice)
     if isinstance(field, HigherOrder):
         found = _find_counterexample(field, rivers, places, push)
-        sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
+        sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
         others = [tuple(other for other in rivers if other is not river) for river in rivers]
-        keepings = [Keeping(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
+        keepings = [HandRetention(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
         return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
     return verdicts | {"switching": _summed_verdict(common)}
 

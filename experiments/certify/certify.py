@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.loop.energy import energy
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
@@ -15,7 +15,7 @@ from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.region import region
-from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, leaving_out
+from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, without_laws
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
@@ -36,7 +36,7 @@ from experiments.files.certificate_files import OPTIONS, clip_inputs, read_certi
 from experiments.files.device_files import linkage_of
 from experiments.files.json_text import json_text
 from experiments.flights.ballistics import clip_ballistics
-from experiments.setups.certified_law import certified_laws, governor_drag, left_out
+from experiments.setups.certified_law import certified_laws, governor_drag, uncertified_parts
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.defaults import resolved
 from models.humanoid.skeleton import DEFAULT_STATURE
@@ -83,7 +83,7 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
     if drag > 0.0:
         for name in verdicts:
             if name.startswith(("energy", "region")) and verdicts[name].verdict != "refuted":
-                verdicts[name] = leaving_out(verdicts[name], ("the governor (--governor)",))
+                verdicts[name] = without_laws(verdicts[name], ("the governor (--governor)",))
     return verdicts
 
 
@@ -94,7 +94,7 @@ def certify_into(
     hands: HandRange | None = None,
     push: float = 1.0,
     clips: Sequence[Clip] = (),
-    judging: Judging = JUDGING,
+    judging: JudgementCriteria = DEFAULT_CRITERIA,
 ) -> Certificate:
     """Certify a run's field and clips, or return the certificate that the folder holds if it has the same inputs.
 
@@ -138,7 +138,7 @@ def certify_into(
     return certificate
 
 
-def certify_clip_into(name: str, out: Path, judging: Judging) -> Certificate:
+def certify_clip_into(name: str, out: Path, judging: JudgementCriteria) -> Certificate:
     """Certify flights and turns of a clip, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters
@@ -207,7 +207,7 @@ def _field_verdicts(
         device, sampling = phantom_device(linkage_of(config.device)), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)
         return main, certify_leading(field, curve, device, sampling, hands)
-    rivers, drag, omitted = certified_rivers(config, delay), governor_drag(config), left_out(config)
+    rivers, drag, omitted = certified_rivers(config, delay), governor_drag(config), uncertified_parts(config)
     verdicts, main = certify(rivers, hands, push, drag), rivers[""]
     if isinstance(config.mode, Rivers):
         verdicts |= certify_rivers(config, config.mode, main, hands, push, certified_curves(config))
@@ -220,7 +220,7 @@ def _field_verdicts(
             name: replace(it, assumptions=(*it.assumptions, _MOMENT_ASSUMPTION)) for name, it in verdicts.items()
         }
     if omitted:
-        verdicts = {name: leaving_out(verdict, omitted) for name, verdict in verdicts.items()}
+        verdicts = {name: without_laws(verdict, omitted) for name, verdict in verdicts.items()}
     if getattr(config.mode, "walls", None) is not None and verdicts["stability"].verdict != "refuted":
         verdicts["stability"] = walled(config, main, verdicts["stability"], hands, clips)
     return main, verdicts

@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.added_laws import rivers_with
-from controllers.certificates.loop.followed_number import NotFollowed
+from controllers.certificates.loop.followed_number import NotExecutable
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
-from controllers.certificates.report import Verdict, hash_of, leaving_out
-from controllers.checks import checked, of_kind
+from controllers.certificates.report import Verdict, hash_of, without_laws
+from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import Join
@@ -28,9 +28,9 @@ from controllers.fields.governor import Governor
 from controllers.fields.orientation import Orientation
 from controllers.fields.own.function_law import FunctionLaw
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.executed_field import REACH, seen
+from experiments.certify.executed_field import DEFAULT_REACH, check_executed
 from experiments.certify.switched_stability import switched_stability
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.run_config import phantom_of
 from experiments.files.device_files import linkage_of
 from experiments.runs.simulation import Simulation
@@ -70,7 +70,7 @@ class _FieldParts(NamedTuple):
     drag: float
 
 
-@in_keywords()
+@with_keyword_messages()
 def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0) -> SimulationCertificate:
     """Certify a simulation's field: certified, refuted with a counterexample, or unknown with a reason.
 
@@ -94,15 +94,15 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
         If an argument is of another kind, the delay is negative or not finite, the simulation's hand is a replayed one,
         which feels no force, or a user-defined law raises or does not return three or six numbers.
     """
-    of_kind("sim", sim, Simulation)
-    of_kind("hands", hands, HandRange | None)
+    check_kind("sim", sim, Simulation)
+    check_kind("hands", hands, HandRange | None)
     checked("delay", delay, "s")
     phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
     own_laws, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
     for law in own_laws if curve is not None else ():
-        with suppress(NotFollowed):  # left by an earlier certificate; it makes this one unknown, below
+        with suppress(NotExecutable):  # left by an earlier certificate; it makes this one unknown, below
             executed(law, curve)  # pyright: ignore[reportArgumentType]
     try:
         parts = _field_parts(sim.field)
@@ -120,7 +120,7 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
         )
         # The condition of passivity covers only the river's spring and damper.
         if passivity_verdict.verdict == "certified" or len(rivers) > 1:
-            passivity_verdict = leaving_out(passivity_verdict, [law.place for law in own_laws])
+            passivity_verdict = without_laws(passivity_verdict, [law.place for law in own_laws])
     return SimulationCertificate(
         _add_assumptions(stability, assumptions), _add_assumptions(passivity_verdict, assumptions), inputs
     )
@@ -138,12 +138,12 @@ def _check_executed(
     """A verdict checked with the executed program about a curve."""
     if curve is None:
         return verdict
-    reach = getattr(sim.haptic_map, "reach", REACH)
+    reach = getattr(sim.haptic_map, "reach", DEFAULT_REACH)
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
     place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), curve, phantom_device(linkage_of(sim.device)), sampling)
     try:
-        return seen(sim.field.program(), place, reach, verdict, hands)
-    except NotFollowed:
+        return check_executed(sim.field.program(), place, reach, verdict, hands)
+    except NotExecutable:
         reason = "a law of one's own keeps numbers of the hand between calls"
         return Verdict("unknown", f"{verdict.reason}; {reason}" if verdict.verdict == "unknown" else reason)
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from controllers.certificates.loop.executed import Seen, looked_about, looked_at
+from controllers.certificates.loop.executed import WorstState, examine_curve, examine_random_states
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.hands_about import told as told_at
+from controllers.certificates.loop.hands_about import state_text as told_at
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program
@@ -18,9 +18,9 @@ from experiments.setups.setups import map_parts, parts_of
 from models.mocap.motion.clip import Clip
 from sim.world.world import World
 
-REACH = 0.025  # [m] for maps without a reach
-NEAR = 0.2  # fraction of the map's reach: distance off the curve to which pushes bring a hand
-FAST = 2.0  # speed of a hand that pushes forwards at the edge of the map, relative to the curve's
+DEFAULT_REACH = 0.025  # [m] for maps without a reach
+MAX_OFFSET_FRACTION = 0.2  # fraction of the map's reach: distance off the curve to which pushes bring a hand
+MAX_SPEED_RATIO = 2.0  # speed of a hand that pushes forwards at the edge of the map, relative to the curve's
 
 
 def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
@@ -35,15 +35,18 @@ def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
 
 
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
-    """A verdict that omits walls, complemented by a check of the executed program (`seen`)."""
+    """A verdict that omits walls, complemented by a check of the executed program (`check_executed`)."""
     parts = executed_parts(config, clips)
-    reach = float(getattr(parts.maps, "reach", REACH))
-    return seen(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
+    reach = float(getattr(parts.maps, "reach", DEFAULT_REACH))
+    return check_executed(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
 
-def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
+def check_executed(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
     """A verdict after a check of the program: refuted if it is unstable in a state about the curve of `main`."""
-    examined = [looked_at(program, main, NEAR * reach, hands.hands()), looked_about(program, main, hands.hands())]
+    examined = [
+        examine_curve(program, main, MAX_OFFSET_FRACTION * reach, hands.hands()),
+        examine_random_states(program, main, hands.hands()),
+    ]
     found, strongest = max(examined, key=lambda it: it.radius), max(it.strongest for it in examined)
     figures = {**verdict.figures, "executed_radius": found.radius, "executed_force": strongest}
     if found.radius >= 1.0:
@@ -60,16 +63,16 @@ def seen(program: Program, main: River, reach: float, verdict: Verdict, hands: H
     )
     if abrupt:
         summary += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
-    far = looked_at(program, main, reach, hands.hands(), FAST)
+    far = examine_curve(program, main, reach, hands.hands(), MAX_SPEED_RATIO)
     if far.radius >= 1.0:
         summary += f", but not for a hand {_place(main, far)}"
     return replace(verdict, reason=f"{verdict.reason}; {summary}", figures=figures)
 
 
-def _place(main: River, found: Seen) -> str:
+def _place(main: River, found: WorstState) -> str:
     off, speed = 1e3 * np.linalg.norm(found.p - main.curve.point(found.phase)), np.linalg.norm(found.v)
     return f"{off:.2g} mm off the curve at phase {found.phase:.3g} s with {speed:.3g} m/s"
 
 
-def _counterexample(found: Seen) -> dict[str, object]:
+def _counterexample(found: WorstState) -> dict[str, object]:
     return {"phase": found.phase, "p": found.p, "v": found.v, "hand": found.hand, "radius": found.radius}

@@ -6,14 +6,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import FROM_WORST, Outcome, hash_of, leaving_out
+from controllers.certificates.report import FROM_WORST, Outcome, hash_of, without_laws
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
-from experiments.files.whole_file import whole_file
-from experiments.setups.certified_law import governor_drag, left_out
+from experiments.files.whole_file import atomic_file
+from experiments.setups.certified_law import governor_drag, uncertified_parts
 from experiments.setups.parts.defaults import resolved
-from sim.compilation.sources import kept_folder
+from sim.compilation.sources import results_folder
 
 _LEADING_REASON = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
 
@@ -42,7 +42,7 @@ class Stability:
         return float("nan") if self.margin is None else 1.0 / max(1.0 + self.margin, 1e-9)
 
 
-def kept_stability(config: RunConfig) -> Stability:
+def cached_stability(config: RunConfig) -> Stability:
     """Certify the stability of a run, or return the cached verdict for the same inputs and code."""
     config, hands = resolved(config), HandRange()
     if config.leads:
@@ -51,7 +51,7 @@ def kept_stability(config: RunConfig) -> Stability:
         inputs = certificate_inputs(config, 0.0, hands, 1.0)
     except ControllerError as error:
         return Stability("unknown", None, str(error))
-    file = kept_folder(__name__) / f"stability-{hash_of(inputs)}.json"
+    file = results_folder(__name__) / f"stability-{hash_of(inputs)}.json"
     with suppress(OSError, ValueError, TypeError):
         return Stability(**json.loads(file.read_text(encoding="utf-8")))
     found = _certify_stability(config, hands)
@@ -65,12 +65,12 @@ def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
     from experiments.certify.certify import certified_rivers
 
     try:
-        rivers, drag, missing = certified_rivers(config), governor_drag(config), left_out(config)
+        rivers, drag, missing = certified_rivers(config), governor_drag(config), uncertified_parts(config)
         verdicts = [governed_stability(river, drag, hands.hands()) for river in rivers.values()]
     except ControllerError as error:
         return Stability("unknown", None, str(error))
     if missing:
-        verdicts = [leaving_out(verdict, missing) for verdict in verdicts]
+        verdicts = [without_laws(verdict, missing) for verdict in verdicts]
     worst = min(verdicts, key=lambda verdict: FROM_WORST.index(verdict.verdict))
     margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)
@@ -78,5 +78,5 @@ def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
 
 def _write_whole(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(text.encode())

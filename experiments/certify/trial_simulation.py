@@ -35,8 +35,8 @@ from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense, se
 from sim.world.plant import Hand, Plant, advance, make_hand
 from sim.world.world import phantom_angles
 
-LAP = 1e6  # [s] duration of a lap, so slow that a trial stays at one configuration
-START = 1e-6  # [m] distance from the curve at which a trial starts
+LAP_DURATION = 1e6  # [s] duration of a lap, so slow that a trial stays at one configuration
+INITIAL_DISTANCE = 1e-6  # [m] distance from the curve at which a trial starts
 
 
 @njit
@@ -59,7 +59,7 @@ class Executed(NamedTuple):
 
 
 @entry_point
-def run_late(
+def run_delayed(
     plant: Plant,
     port: PhantomPort,
     hand: Hand,
@@ -156,7 +156,7 @@ def draw_trial(rng: np.random.Generator) -> Trial:
         angle = np.linspace(0.0, 2.0 * np.pi, 97)
         points = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes.T
         points[-1] = points[0]
-        curve = Trajectory(LAP * angle / (2.0 * np.pi), points, periodic=True)
+        curve = Trajectory(LAP_DURATION * angle / (2.0 * np.pi), points, periodic=True)
         period = float(0.25e-3 * 16.0 ** rng.uniform())
         sampling = Sampling(period, float(rng.integers(4)) * period, float(rng.uniform(80.0, 250.0)))
         hand = HandImpedance()
@@ -164,11 +164,11 @@ def draw_trial(rng: np.random.Generator) -> Trial:
             stiffness = float(rng.uniform(50.0, 500.0)) if rng.uniform() < 0.5 else 0.0
             hand = HandImpedance(float(rng.uniform(0.0, 0.3)), float(rng.uniform(0.5, 8.0)), stiffness)
         try:
-            for point in curve.point(np.linspace(0.0, LAP, 24)):
+            for point in curve.point(np.linspace(0.0, LAP_DURATION, 24)):
                 phantom_angles(point)
         except SimError:  # out of the workspace: draw another one
             continue
-        phase = float(rng.uniform(0.0, LAP))
+        phase = float(rng.uniform(0.0, LAP_DURATION))
         tangent = curve.velocity(phase) / np.linalg.norm(curve.velocity(phase))
         sideways = rng.normal(size=3)
         sideways -= tangent * (tangent @ sideways)
@@ -226,10 +226,10 @@ class Conditions:
     integrator: mujoco.mjtIntegrator = mujoco.mjtIntegrator.mjINT_RK4
     rounded: bool = False
     coulomb: bool = False
-    start: float = START
+    start: float = INITIAL_DISTANCE
 
 
-EVERYTHING = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
+FULL_CONDITIONS = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded=True, coulomb=True)
 """The conditions of a run: the world's own integrator, quantised encoders and Coulomb friction."""
 
 
@@ -290,5 +290,5 @@ def hand_path(
     hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
     field = Executed(program.compiled(), program.fresh_memory(), program.fresh_walkers())
-    run_late(plant, port, hand, field, late, conditions.rounded, path)
+    run_delayed(plant, port, hand, field, late, conditions.rounded, path)
     return path[np.isfinite(path[:, 0])]

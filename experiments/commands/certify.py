@@ -9,19 +9,19 @@ from typing import Annotated
 from pydantic import TypeAdapter
 from tyro.conf import Positional
 
-from controllers.certificates.flight.tolerance import BallisticTolerance, Judging
+from controllers.certificates.flight.tolerance import BallisticTolerance, JudgementCriteria
 from controllers.certificates.loop.hand import NO_HANDS, HandRange
 from controllers.certificates.report import Certificate, ChangedInputs
 from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
-from experiments.config.words import Options, RunOptions, config_of_options, given_words
+from experiments.config.words import Options, RunOptions, config_of_options, given_options
 from experiments.console.output import Json, say
 from experiments.console.progress import working
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
-ASKED = "asked.json"
+COMMAND_FILE = "asked.json"
 """File beside a certificate, with the options of the command that made it."""
 
 
@@ -56,7 +56,7 @@ class Command:
     """Certify for nobody's hand on the stylus."""
     tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
     """What passes for a flight."""
-    friction: Annotated[float, above(0.0)] = Judging.friction
+    friction: Annotated[float, above(0.0)] = JudgementCriteria.friction
     """Coefficient of friction of soles on the floor, for clips [1]."""
     verify: Path | None = None
     """Only check that this certificate.json is of the same field, hands, clips and code, by default of those that it
@@ -82,9 +82,9 @@ class Command:
 
     def _refuse_unused(self) -> None:
         """Refuse options that have no effect on a clip, a run, a stylus without a hand, or a field without clips."""
-        from experiments.setups.certified_law import of_clips
+        from experiments.setups.certified_law import depends_on_clips
 
-        words = [*given_words(self.options)]
+        words = [*given_options(self.options)]
         own = [name for name in ("delay", "hand_push", "no_hand") if getattr(self, name) != getattr(Command, name)]
         hand = [f"hand.{f.name}" for f in fields(self.hand) if getattr(self.hand, f.name) != f.default]
         if self.clip is not None:
@@ -95,23 +95,25 @@ class Command:
             _refuse_options(words, f"a run, whose field is as recorded in {self.run}", "a field without a run")
         if self.no_hand:
             _refuse_options(hand, "--no-hand", "a hand on the stylus")
-        if self.clip is None and self.run is None and not of_clips(config_of_options(self.options)):
+        if self.clip is None and self.run is None and not depends_on_clips(config_of_options(self.options)):
             judging = fields(self.tolerance)
             judged = [f"tolerance.{f.name}" for f in judging if getattr(self.tolerance, f.name) != f.default]
-            _refuse_options([*judged, *["friction"] * (self.friction != Judging.friction)], "a field alone", "clips")
+            _refuse_options(
+                [*judged, *["friction"] * (self.friction != JudgementCriteria.friction)], "a field alone", "clips"
+            )
 
     def _hand_range(self) -> HandRange:
         return NO_HANDS if self.no_hand else self.hand
 
-    def _judging(self) -> Judging:
-        return Judging(self.tolerance, self.friction)
+    def _judging(self) -> JudgementCriteria:
+        return JudgementCriteria(self.tolerance, self.friction)
 
     def _config_and_clips(self) -> tuple[RunConfig, tuple[Clip, ...]]:
         """Configuration of the field, and the clips that are certified with it; none where only gains matter."""
-        from experiments.setups.certified_law import of_clips
+        from experiments.setups.certified_law import depends_on_clips
 
         config = config_of_options(self.options)
-        if self.run is None and not of_clips(config):
+        if self.run is None and not depends_on_clips(config):
             return config, ()
         from experiments.certify.certified_clips import run_and_clips
 
@@ -138,12 +140,12 @@ class Command:
                     config, folder, self.delay, self._hand_range(), self.hand_push, clips, self._judging()
                 )
         options = replace(self, out=None, overwrite=False, json=False)
-        (folder / ASKED).write_bytes(TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True))
+        (folder / COMMAND_FILE).write_bytes(TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True))
         return certificate
 
     def _original_command(self, file: Path) -> "Command":
         """The command that made a certificate, unless this command has options of its own."""
-        options_file = file.parent / ASKED
+        options_file = file.parent / COMMAND_FILE
         if replace(self, verify=None, json=False) != Command() or not options_file.exists():
             return self
         try:

@@ -20,9 +20,9 @@ class ListDevices:
 
     def __call__(self) -> int:
         """Name them."""
-        from sim.devices.hardware_list import found_devices
+        from sim.devices.hardware_list import list_devices
 
-        devices = found_devices()
+        devices = list_devices()
         if self.json:
             print(json_text([asdict(device) for device in devices]))
             return 0
@@ -49,9 +49,9 @@ class Doctor:
         """Measure, and print the findings."""
         from experiments.hardware.doctor import findings, measured_lateness
         from experiments.hardware.link import measured_link
-        from sim.devices.hardware_list import found_devices, open_device
+        from sim.devices.hardware_list import list_devices, open_device
 
-        devices = found_devices()
+        devices = list_devices()
         checks, lateness = findings(devices), measured_lateness(self.seconds)
         link = identity = None
         if self.device is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from controllers.haptic_map.lifting.room import Room
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 from experiments.console.output import Json, say
 from experiments.console.progress import working
 
@@ -24,7 +24,7 @@ class Command:
     """Where curves may be, and how near to each other and how fast."""
     cyclic: tuple[str, ...] = ()
     """Clips that have to close; by default all those are closed curves that do."""
-    seed: Annotated[int, whole(0)] = 1
+    seed: Annotated[int, whole_number(0)] = 1
     """Of the places from which the arrangement begins."""
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""

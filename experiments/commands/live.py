@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 from experiments.config.words import Options, config_of_options
 
 
@@ -13,7 +13,7 @@ class Command:
 
     options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
-    port: Annotated[int, whole(0, 2**16)] = 8080
+    port: Annotated[int, whole_number(0, 2**16)] = 8080
     """Of the page; the next free one is taken if it is in use."""
     host: str = "127.0.0.1"
     """Address to listen on; on any but this machine's own, the page asks for a token, which is printed."""

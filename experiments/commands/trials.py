@@ -5,7 +5,7 @@ from typing import Annotated
 
 import tyro
 
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 from experiments.console.output import Json
 from experiments.trials.execution.where import Where
 
@@ -18,9 +18,9 @@ class Command(Where):
     """TOML file of the study; see docs/how-to/user-studies.md."""
     out: Path = Path("runs/study")
     """Folder of database, tables and report; one that holds this study is continued."""
-    users: Annotated[int | None, whole(1)] = None
+    users: Annotated[int | None, whole_number(1)] = None
     """How many users, in place of the study's number."""
-    seed: Annotated[int | None, whole(0)] = None
+    seed: Annotated[int | None, whole_number(0)] = None
     """Of population and trials, in place of the study's."""
     json: Json = False
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import tyro
 
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 from experiments.console.output import Json
 from experiments.trials.execution.where import Where
 
@@ -18,7 +18,7 @@ class Command(Where):
     """TOML file of the tuning; see docs/how-to/tuning.md."""
     out: Path = Path("runs/tune")
     """Folder of journal, database, report and the chosen configuration; one that holds this tuning is continued."""
-    candidates: Annotated[int | None, whole(1)] = None
+    candidates: Annotated[int | None, whole_number(1)] = None
     """How many are simulated, in place of the tuning's number."""
     json: Json = False
 

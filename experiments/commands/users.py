@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 from experiments.console.output import Json, say
 from experiments.console.progress import working
 
@@ -14,9 +14,9 @@ class Command:
 
     out: Path = Path("runs/users")
     """Folder to write."""
-    people: Annotated[int, whole(1)] = 6
+    people: Annotated[int, whole_number(1)] = 6
     """How many people of a population take part."""
-    seed: Annotated[int, whole(0)] = 1
+    seed: Annotated[int, whole_number(0)] = 1
     """Of the population and of its noise."""
     laws: tuple[str, ...] = ()
     """fitts, scatter, steering, power-law, tremor, step-response, grip, practice, endurance; all by default."""

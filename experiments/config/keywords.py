@@ -1,7 +1,8 @@
 """Error messages for Python callers: options of the command line become keyword arguments.
 
-Messages are written with options. Functions that are called from Python translate them to keywords (`in_keywords`); the
-command line, which may call the same functions, prints the original message (`in_options`).
+Messages are written with options. Functions that are called from Python translate them to keywords
+(`with_keyword_messages`); the command line, which may call the same functions, prints the original message
+(`option_message`).
 """
 
 import re
@@ -24,12 +25,12 @@ _OPTION_PATTERN = re.compile(
 _ORIGINAL_MESSAGE = "options"  # attribute of an error: its message as written, with options
 
 
-def in_options(error: Exception) -> str:
-    """Message of an error in terms of options, even if `in_keywords` has translated it to keywords."""
+def option_message(error: Exception) -> str:
+    """Message of an error in terms of options, even if `with_keyword_messages` has translated it to keywords."""
     return vars(error).get(_ORIGINAL_MESSAGE, str(error))
 
 
-def keywords(text: str, **others: str) -> str:
+def to_keywords(text: str, **others: str) -> str:
     """A message that names keywords, ``wall_margin=0.1`` for ``--wall-margin 0.1``.
 
     Parameters
@@ -51,8 +52,8 @@ def keywords(text: str, **others: str) -> str:
     return _OPTION_PATTERN.sub(keyword, text)
 
 
-def in_keywords(**others: str) -> Callable[[_F], _F]:
-    """Decorator of a function that is called from Python: its errors name keywords; see `keywords`."""
+def with_keyword_messages(**others: str) -> Callable[[_F], _F]:
+    """Decorator of a function that is called from Python: its errors name keywords; see `to_keywords`."""
 
     def decorate(function: _F) -> _F:
         @wraps(function)
@@ -61,7 +62,7 @@ def in_keywords(**others: str) -> Callable[[_F], _F]:
                 return function(*arguments, **given)
             except (ControllerError, ModelError, SimError) as error:
                 vars(error).setdefault(_ORIGINAL_MESSAGE, str(error))
-                error.args = (keywords(str(error), **others),)
+                error.args = (to_keywords(str(error), **others),)
                 raise
 
         return cast(_F, wrapper)

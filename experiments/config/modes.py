@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
+from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
 from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, part
 
@@ -35,7 +35,7 @@ class SpeedGovernor:
         Of the hand's speed beyond what is admissible [N s/m].
     """
 
-    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+    governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
 
 
 NO_DRAG = (
@@ -44,7 +44,7 @@ NO_DRAG = (
 )
 
 
-def gates(crossing: str) -> bool:
+def gates_rivers(crossing: str) -> bool:
     """Whether a governor of rivers gates them, rather than being a drag."""
     return crossing != "sum"
 
@@ -88,8 +88,8 @@ class Follow:
     """
 
     kind: Literal["follow"] = "follow"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MAX_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     flow: Literal["curve", "parallel"] | None = None
     orientation: OrientationMoment | None = None
@@ -118,8 +118,8 @@ class Bunny:
     """
 
     kind: Literal["bunny"] = "bunny"
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MAX_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
     bunny_width: float = at_least(1e-4, default=0.05, unit="m")
     bunny_attraction: Literal["point", "along", "convolution"] = "point"
     bunny_pace: Literal["clock", "wait"] = "wait"
@@ -149,8 +149,8 @@ class Rivers:
     """
 
     kind: Literal["rivers"] = "rivers"
-    stiffness: float | None = above(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
-    damping: float | None = above(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
+    stiffness: float | None = above(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
+    damping: float | None = above(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
     river_tube: float = at_least(1e-4, default=0.015, unit="m")
     crossing: Literal["smooth", "discrete", "sum"] = "discrete"
     orientation: OrientationMoment | None = None
@@ -158,7 +158,7 @@ class Rivers:
     walls: JointWalls | None = None
 
     def __post_init__(self) -> None:
-        if self.governor not in (None, SpeedGovernor()) and gates(self.crossing):
+        if self.governor not in (None, SpeedGovernor()) and gates_rivers(self.crossing):
             raise ParameterError(NO_DRAG)
 
 
@@ -186,9 +186,9 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MOST_STIFFNESS)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MAX_STIFFNESS)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
     rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
@@ -210,14 +210,14 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MOST_STIFFNESS)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MOST_STIFFNESS)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MOST_DAMPING)
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MAX_STIFFNESS)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
     rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
     bump: float = above(0.0, default=0.5, unit="s")
-    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MOST_STIFFNESS)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+    stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MAX_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
     walls: JointWalls | None = None
 
@@ -237,8 +237,8 @@ class Lead:
     """
 
     kind: Literal["lead"] = "lead"
-    leash: float = at_least(0.0, default=120.0, unit="N/m", most=MOST_STIFFNESS)
-    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MOST_DAMPING)
+    leash: float = at_least(0.0, default=120.0, unit="N/m", most=MAX_STIFFNESS)
+    damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
     floor_scale: float | None = at_least(1e-3, default=None, most=1e4)
 
 

@@ -14,18 +14,20 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import in_keywords, in_options, keywords
+from experiments.config.keywords import option_message, to_keywords, with_keyword_messages
 from sim.errors import SimError
 
 _Part = TypeVar("_Part")
-MOST = 1e15
+MAX_NUMBER = 1e15
 """Upper bound of the numbers of a part, in SI units: its square, and that of a difference, is still finite."""
 INFINITE = "Infinity"
 """How pydantic writes an infinite number in JSON, which has none."""
 _CONFIG = ConfigDict(extra="forbid", ser_json_inf_nan="strings", arbitrary_types_allowed=True)
 
 
-def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MOST) -> Any:
+def at_least(
+    least: float, *, default: Any = ..., unit: str = "", infinite: bool = False, most: float = MAX_NUMBER
+) -> Any:
     """Number of a part that is `least` or more, at most `most`, by default finite; `unit` is for messages.
 
     Without a default it is used in an annotation, and the field has an ordinary default that the command line reads.
@@ -34,17 +36,17 @@ def at_least(least: float, *, default: Any = ..., unit: str = "", infinite: bool
     return Field(default=default, ge=least, le=limit, allow_inf_nan=infinite, json_schema_extra={"unit": unit})
 
 
-def whole(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
+def whole_number(least: int, below: int = 2**63, *, default: Any = ...) -> Any:
     """Whole number of a part that is `least` or more and less than `below`, by default within the 64 bits of a file."""
     return Field(default=default, ge=least, lt=below)
 
 
-def above(least: float, *, default: Any = ..., unit: str = "", most: float = MOST) -> Any:
+def above(least: float, *, default: Any = ..., unit: str = "", most: float = MAX_NUMBER) -> Any:
     """Number of a part that is greater than `least`, at most `most`, and finite."""
     return Field(default=default, gt=least, le=most, allow_inf_nan=False, json_schema_extra={"unit": unit})
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole, Field))
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(at_least, above, whole_number, Field))
 def part(cls: type[_Part]) -> type[_Part]:
     """Make a class a part of a configuration."""
     cast(Any, cls).__get_pydantic_core_schema__ = classmethod(_schema)
@@ -52,7 +54,7 @@ def part(cls: type[_Part]) -> type[_Part]:
     init, named = made.__init__, [field for field in fields(made) if field.init]
     places = [field.name for field in named if not field.kw_only]
 
-    @in_keywords()
+    @with_keyword_messages()
     def __init__(self: object, *arguments: Any, **values: Any) -> None:
         if len(arguments) > len(places):
             raise ParameterError(
@@ -63,7 +65,9 @@ def part(cls: type[_Part]) -> type[_Part]:
             init(self, **dict(zip(places, arguments, strict=False)), **values)
         except ValidationError as error:
             own = error.errors()[0].get("ctx", {}).get("error")  # raised by the part itself
-            raise (own if isinstance(own, ParameterError) else ParameterError(one_line(error, made))) from None
+            raise (
+                own if isinstance(own, ParameterError) else ParameterError(validation_message(error, made))
+            ) from None
 
     made.__init__ = __init__
     return cast(type[_Part], made)
@@ -130,7 +134,7 @@ def from_json(cls: type[_Part], text: str | bytes, where: str) -> _Part:
     try:
         return TypeAdapter(cls).validate_json(text)
     except ValidationError as error:
-        raise ParameterError(f"{where}: {keywords(one_line(error, cls))}") from None
+        raise ParameterError(f"{where}: {to_keywords(validation_message(error, cls))}") from None
 
 
 def from_file(cls: type[_Part], path: Path) -> _Part:
@@ -155,7 +159,7 @@ def from_dict(cls: type[_Part], values: Mapping[str, object], where: str) -> _Pa
     try:
         return TypeAdapter(cls).validate_python(values)
     except ValidationError as error:
-        raise ParameterError(f"{where}: {keywords(one_line(error, cls))}") from None
+        raise ParameterError(f"{where}: {to_keywords(validation_message(error, cls))}") from None
 
 
 _EXPECTED = {
@@ -166,7 +170,7 @@ _EXPECTED = {
 """What is expected, where pydantic's own message names types of its schema."""
 
 
-def one_line(error: ValidationError, cls: type) -> str:
+def validation_message(error: ValidationError, cls: type) -> str:
     """The first thing that is wrong, in one line: option, value, and what would be right."""
     first = error.errors(include_url=False)[0]
     place, kind, context = first["loc"], first["type"], first.get("ctx", {})
@@ -198,7 +202,7 @@ def one_line(error: ValidationError, cls: type) -> str:
     if kind == "json_invalid":
         return f"is not JSON ({context['error']}); expected a configuration"
     if kind == "value_error":  # raised by parts, actions and persons themselves
-        return in_options(context["error"])
+        return option_message(context["error"])
     where = ".".join(map(str, place))
     if kind in ("missing", "missing_argument"):
         return f"{where} is missing"

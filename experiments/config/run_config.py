@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.maps import Cylindrical, Led, Map, RobotArm
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
-from experiments.config.part import above, at_least, from_file, part, whole
+from experiments.config.part import above, at_least, from_file, part, whole_number
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
@@ -19,7 +19,7 @@ from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
 from sim.world.world import BodyKind, FigureKind
 
-PERSONAL = ("exaggerate", "cut", "change", "resist", "lost")
+PERSON_INTENTS = ("exaggerate", "cut", "change", "resist", "lost")
 """What only a person can do, since it takes sight and touch."""
 
 
@@ -53,7 +53,7 @@ class User:
     person: Person | None = None
 
     def __post_init__(self) -> None:
-        if self.person is None and self.does in PERSONAL:
+        if self.person is None and self.does in PERSON_INTENTS:
             raise ParameterError(f"only a person can {self.does}; add a person, such as --person median")
         if self.person is not None and (self.does == "turn" or self.turns):
             raise ParameterError(
@@ -72,29 +72,29 @@ class User:
     @property
     def traces(self) -> bool:
         """Whether the hand moves along a path of its own."""
-        return self.does == "trace" or self.does in PERSONAL
+        return self.does == "trace" or self.does in PERSON_INTENTS
 
 
 _ANIMATION_OPTIONS, _RESIDUAL_OPTIONS = ("smoothing", "figure_ticks", "blend"), ("residual_force", "residual_moment")
 _MEANINGLESS_SIZES: dict[BodyKind, tuple[str, ...]] = {
     "physical": (), "kinematic": ("mass",), "none": ("stature", "mass"), "robot": ("stature", "mass")
 }  # fmt: skip
-MEANINGLESS: dict[BodyKind, tuple[str, ...]] = {
+MEANINGLESS_OPTIONS: dict[BodyKind, tuple[str, ...]] = {
     "physical": (), "kinematic": _RESIDUAL_OPTIONS, "none": (*_ANIMATION_OPTIONS, *_RESIDUAL_OPTIONS),
     "robot": ("blend", *_RESIDUAL_OPTIONS)
 }  # fmt: skip
 """Numbers of a figure that have no meaning for a kind of body, whatever is played."""
 
 
-def meaningless(body: str, leads: bool) -> tuple[str, ...]:
+def meaningless_options(body: str, leads: bool) -> tuple[str, ...]:
     """Numbers of a figure that have no meaning for a kind of body; the size of a led figure always has one."""
     kind = cast(BodyKind, body)
-    return MEANINGLESS.get(kind, ()) + (() if leads else _MEANINGLESS_SIZES.get(kind, ()))
+    return MEANINGLESS_OPTIONS.get(kind, ()) + (() if leads else _MEANINGLESS_SIZES.get(kind, ()))
 
 
-def no_meaning(name: str, value: object, body: str) -> ParameterError:
+def meaningless_option_error(name: str, value: object, body: str) -> ParameterError:
     """The error that a number of a figure has no meaning for a kind of body; it names the figures that have it."""
-    others = [other for other in get_args(FigureKind) if name not in meaningless(other, leads=False)]
+    others = [other for other in get_args(FigureKind) if name not in meaningless_options(other, leads=False)]
     chosen = "a robot arm" if body == "robot" else f"--figure {body}"
     return ParameterError(
         f"--{name.replace('_', '-')} {value} has no meaning with {chosen}; it belongs to --figure {', '.join(others)}"
@@ -133,7 +133,7 @@ class Figure:
     stature: float = above(0.0, default=DEFAULT_STATURE, unit="m")
     mass: float = above(0.0, default=DEFAULT_MASS, unit="kg")
     smoothing: float = above(0.0, default=6.0, unit="Hz")
-    figure_ticks: int = whole(1, default=2)
+    figure_ticks: int = whole_number(1, default=2)
     blend: float = at_least(0.0, default=0.4, unit="s")
     residual_force: float = at_least(0.0, default=FigureGains().force_bound)
     residual_moment: float = at_least(0.0, default=FigureGains().moment_bound)
@@ -141,7 +141,7 @@ class Figure:
     def __post_init__(self) -> None:
         self.check(leads=True, body=self.kind)
 
-    @in_keywords(figure="kind")
+    @with_keyword_messages(figure="kind")
     def check(self, leads: bool, body: BodyKind) -> None:
         """Refuse numbers that have no meaning for a kind of body, led or not.
 
@@ -152,14 +152,14 @@ class Figure:
         """
         if body == "robot" and self.kind != "physical":
             raise ParameterError(f"a robot arm takes the figure's place; leave out --figure {self.kind}")
-        for name in meaningless(body, leads):
+        for name in meaningless_options(body, leads):
             value = getattr(self, name)
             if value != FIGURE_DEFAULTS[name]:
-                raise no_meaning(name, f"{value:g}", body)
+                raise meaningless_option_error(name, f"{value:g}", body)
 
     def become(self, kind: FigureKind, leads: bool) -> "Figure":
         """The same figure as another kind; numbers that have no meaning for that kind get their defaults."""
-        return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless(kind, leads)})
+        return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless_options(kind, leads)})
 
     @model_serializer(mode="wrap")
     def _serialise(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -168,7 +168,7 @@ class Figure:
 
     def _meaningful_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Those of the numbers that have a meaning, and others that were given, such as the size of a led figure."""
-        idle = meaningless(self.kind, leads=False)
+        idle = meaningless_options(self.kind, leads=False)
         return {name: value for name, value in values.items() if name not in idle or value != FIGURE_DEFAULTS[name]}
 
     def __repr__(self) -> str:
@@ -256,11 +256,11 @@ class Clock:
     physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 
-SIMULATED_TOO = "a replayed hand has no simulated user; leave out the user and what it does, or the replay"
+REPLAY_WITH_USER = "a replayed hand has no simulated user; leave out the user and what it does, or the replay"
 SEED = 1
 """Seed of a run that is given none."""
 NO_SEED = "a replayed hand begins where it was recorded, whatever the seed; leave out the seed, or the replay"
-NOBODY_LED = "the mode lead with the figure none: nobody to lead; expected another figure"
+LEAD_WITHOUT_FIGURE = "the mode lead with the figure none: nobody to lead; expected another figure"
 
 
 def check_seed(device: Device, seed: int) -> None:
@@ -294,7 +294,7 @@ class RunConfig:
     device: Device = Phantom()
     clock: Clock = Clock()
     seconds: float = above(0.0, default=20.0, unit="s")
-    seed: int = whole(0, default=SEED)
+    seed: int = whole_number(0, default=SEED)
 
     def __post_init__(self) -> None:
         if self.leads != isinstance(self.map, Led):
@@ -310,7 +310,7 @@ class RunConfig:
         check_seed(self.device, self.seed)
         if isinstance(self.device, Replay):
             if self.user != User(does="lead" if self.leads else "relaxed"):
-                raise ParameterError(SIMULATED_TOO)
+                raise ParameterError(REPLAY_WITH_USER)
             if isinstance(self.mode, StretchThenFollow):
                 raise ParameterError(
                     "the mode stretch-then-follow performs when the simulated hand has bent the curve, and a replayed "
@@ -338,7 +338,7 @@ class RunConfig:
         """Content of a file: without numbers of the figure that have no meaning for a robot arm in its place."""
         held = cast(dict[str, Any], plain(self))
         if self.body == "robot":
-            idle = ("kind", *meaningless("robot", leads=False))
+            idle = ("kind", *meaningless_options("robot", leads=False))
             held["figure"] = {name: value for name, value in held["figure"].items() if name not in idle}
         return held
 

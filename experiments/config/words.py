@@ -16,11 +16,11 @@ import tyro
 
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile, RobotArm
-from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates
+from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates_rivers
 from experiments.config.run_config import (
+    LEAD_WITHOUT_FIGURE,
     NO_SEED,
-    NOBODY_LED,
-    PERSONAL,
+    PERSON_INTENTS,
     Clock,
     Figure,
     FigureKind,
@@ -29,21 +29,21 @@ from experiments.config.run_config import (
     RunConfig,
     User,
     load_config,
-    meaningless,
-    no_meaning,
+    meaningless_option_error,
+    meaningless_options,
 )
 from sim.users.person.population import PERSONAS, persona
 
-ADDED = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
+OPTIONAL_PARTS = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Optional parts of a mode: an option of its name switches one on, or any of its numbers where those default to 0."""
 _SWITCHES = ("governor", "walls")
-_USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSONAL)
-_NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *ADDED}
+_USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSON_INTENTS)
+_NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *OPTIONAL_PARTS}
 _HAND_OPTIONS = {"user", "person", "pushes", "turns", "grabs"}
 
 
 @dataclass(frozen=True)
-class Word:
+class Option:
     """An option: its type, what it means, and the parts that it belongs to."""
 
     hint: Any
@@ -61,10 +61,10 @@ def parameters(cls: type) -> dict[str, str]:
     return found
 
 
-def _vocabulary() -> dict[str, Word]:
+def _vocabulary() -> dict[str, Option]:
     """All options by name."""
-    words: dict[str, Word] = {}
-    for cls in (*MODES, *ADDED.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
+    words: dict[str, Option] = {}
+    for cls in (*MODES, *OPTIONAL_PARTS.values(), *MAPS, Led, Circle, Figure, Phantom, Clock):
         hints, help_texts = get_type_hints(cls), parameters(cls)
         for option in fields(cast(Any, cls)):
             if option.name in _NON_OPTIONS:
@@ -74,9 +74,9 @@ def _vocabulary() -> dict[str, Word]:
             known = words.get(option.name)
             if known is None:
                 default_text = f" Default: {_default_text(default)}." if default not in (None, "", False) else ""
-                words[option.name] = Word(plain(hints[option.name]), help_text + default_text, (cls,))
+                words[option.name] = Option(optional_type(hints[option.name]), help_text + default_text, (cls,))
             else:
-                words[option.name] = Word(known.hint, known.help, (*known.parts, cls))
+                words[option.name] = Option(known.hint, known.help, (*known.parts, cls))
     return words
 
 
@@ -84,7 +84,7 @@ def _default_text(default: object) -> str:
     return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
 
 
-def plain(hint: Any) -> Any:
+def optional_type(hint: Any) -> Any:
     """The type of an option that may be left out."""
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(inner for inner in get_args(hint) if inner is not type(None))
@@ -139,7 +139,7 @@ def run_config(
                 f"in the mode lead the map is the led figure's and the hand leads; leave out {', '.join(wrong)}"
             )
         if figure == "none":
-            raise ParameterError(NOBODY_LED)
+            raise ParameterError(LEAD_WITHOUT_FIGURE)
         map_cls, user = Led, "lead"
     elif map.endswith(MAP_SUFFIX):
         map_cls = MapFile
@@ -181,12 +181,12 @@ def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object
 
 def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:
     """Refuse options that have no effect on the chosen parts, even if their value is the default."""
-    for name in meaningless(body, mode == "lead"):
+    for name in meaningless_options(body, mode == "lead"):
         if name in given:
-            raise no_meaning(name, given[name], body)
+            raise meaningless_option_error(name, given[name], body)
     if replay and "seed" in given:
         raise ParameterError(NO_SEED)
-    if mode == "rivers" and "governor_drag" in given and gates(str(given.get("crossing", ""))):
+    if mode == "rivers" and "governor_drag" in given and gates_rivers(str(given.get("crossing", ""))):
         raise ParameterError(NO_DRAG)
 
 
@@ -229,7 +229,7 @@ class _GivenOptions:
     def added(self, mode: type) -> dict[str, Any]:
         """Take the optional parts of a mode."""
         found: dict[str, Any] = {}
-        for name, cls in ADDED.items():
+        for name, cls in OPTIONAL_PARTS.items():
             if name not in _field_names(mode):
                 continue
             switched = bool(self._given.pop(name, False))
@@ -244,7 +244,7 @@ class _GivenOptions:
             return
         name = next(iter(remaining))
         owners = [_choice_option(cls) for cls in VOCABULARY[name].parts] if name in VOCABULARY else []
-        if name in ADDED:
+        if name in OPTIONAL_PARTS:
             owners = [_choice_option(cls) for cls in MODES if name in _field_names(cls)]
         option = "--" + name.replace("_", "-")
         if not owners:
@@ -254,7 +254,7 @@ class _GivenOptions:
 
 def _choice_option(cls: type) -> str:
     """How a part is chosen on the command line."""
-    added = next((name for name, part in ADDED.items() if part is cls), None)
+    added = next((name for name, part in OPTIONAL_PARTS.items() if part is cls), None)
     if added in _SWITCHES:
         return f"--{added}"
     if added is not None:
@@ -292,7 +292,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("seconds", float | None, top["seconds"] + " Default: 20.", None)
     yield option("seed", int | None, top["seed"] + " Default: 1.", None)
     for name in _SWITCHES:
-        yield option(name, bool, (ADDED[name].__doc__ or "").strip().split("\n")[0], False)
+        yield option(name, bool, (OPTIONAL_PARTS[name].__doc__ or "").strip().split("\n")[0], False)
     for name, word in VOCABULARY.items():
         yield option(name, word.hint, word.help, () if name == "clips" else False if word.hint is bool else None)
 
@@ -303,7 +303,7 @@ Options = Annotated[RunOptions, tyro.conf.OmitArgPrefixes, tyro.conf.arg(name="r
 """`RunOptions` as a field of a command that has options of its own too."""
 
 
-def given_words(options: object) -> dict[str, Any]:
+def given_options(options: object) -> dict[str, Any]:
     """Options that are given, by name."""
     given = {f.name: getattr(options, f.name) for f in fields(cast(Any, options)) if f.default is not MISSING}
     # A zero counts as given, although it equals False.
@@ -318,12 +318,14 @@ def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingPro
     ParameterError, SimError
         As `run_config`, or if the file holds no configuration.
     """
-    given = given_words(options)
+    given = given_options(options)
     file = given.pop("config", None)
-    return run_config(**(dict(otherwise) | given)) if file is None else changed(load_config(cast(Path, file)), given)
+    return (
+        run_config(**(dict(otherwise) | given)) if file is None else with_options(load_config(cast(Path, file)), given)
+    )
 
 
-def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
+def with_options(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     """A configuration with some options changed; a mode or a map of another kind starts from its own defaults.
 
     Raises
@@ -331,26 +333,28 @@ def changed(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
     ParameterError
         As `run_config`.
     """
-    unchanged, dropped = words_of(config), set[str]()
+    unchanged, dropped = options_of(config), set[str]()
     mode, map = words.get("mode", config.mode.kind), str(words.get("map", config.map.kind))
     leads = (mode == "lead") != config.leads
     if mode != config.mode.kind:
-        dropped |= _field_names(type(config.mode)).union(ADDED, *(_field_names(cls) for cls in ADDED.values()))
+        dropped |= _field_names(type(config.mode)).union(
+            OPTIONAL_PARTS, *(_field_names(cls) for cls in OPTIONAL_PARTS.values())
+        )
     if leads or ("file" if map.endswith(MAP_SUFFIX) else map) != config.map.kind:
         dropped |= _field_names(type(config.map)) | _field_names(Circle) | {"map"}
     if leads:
         dropped |= {"user", "pushes", "turns", "grabs"}
     if words.get("replay"):
         dropped |= _HAND_OPTIONS | _field_names(Phantom) | {"seed"}
-    if mode == "rivers" and gates(str(words.get("crossing", unchanged.get("crossing")))):
+    if mode == "rivers" and gates_rivers(str(words.get("crossing", unchanged.get("crossing")))):
         dropped.add("governor_drag")
     body = "robot" if map == RobotArm.kind else str(words.get("figure", config.figure.kind))
-    dropped |= set(meaningless(body, mode == "lead"))
+    dropped |= set(meaningless_options(body, mode == "lead"))
     unchanged = {name: value for name, value in unchanged.items() if name not in dropped}
     return run_config(**(unchanged | dict(words)))  # pyright: ignore[reportArgumentType]
 
 
-def words_of(config: RunConfig) -> dict[str, object]:
+def options_of(config: RunConfig) -> dict[str, object]:
     """The options of a configuration: the inverse of `run_config`."""
     words: dict[str, object] = {
         "seconds": config.seconds,
@@ -362,16 +366,17 @@ def words_of(config: RunConfig) -> dict[str, object]:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):
         words |= {
-            name: getattr(part, name) for name in _field_names(type(part)) - {"does", "file", "run", *ADDED, "around"}
+            name: getattr(part, name)
+            for name in _field_names(type(part)) - {"does", "file", "run", *OPTIONAL_PARTS, "around"}
         }
-    for name, cls in ADDED.items():
+    for name, cls in OPTIONAL_PARTS.items():
         part = getattr(config.mode, name, None)
         if part is not None:
             words |= {word: getattr(part, word) for word in _field_names(cls)} | (
                 {name: True} if name in _SWITCHES else {}
             )
-    idle = set(meaningless(config.body, config.leads))
-    if isinstance(config.mode, Rivers) and gates(config.mode.crossing):
+    idle = set(meaningless_options(config.body, config.leads))
+    if isinstance(config.mode, Rivers) and gates_rivers(config.mode.crossing):
         idle.add("governor_drag")
     if isinstance(config.device, Replay):
         idle.add("seed")

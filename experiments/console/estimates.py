@@ -23,7 +23,7 @@ def check_length(out: Path, seconds: float, servo_period: float) -> None:
     _check_disk_space(out, seconds, _MIN_BYTES_PER_TICK / servo_period)
 
 
-def foreseen(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | None:
+def cost_estimate(out: Path, seconds: float, groups: Mapping[str, Group]) -> str | None:
     """Time and disk space that a run will take, in words; None if both are small.
 
     Raises

@@ -25,10 +25,10 @@ class _RemainingTimeColumn(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         """As ``12 s, about 18 s left``."""
-        return Text(left(task.elapsed or 0.0, self._expected))
+        return Text(remaining_text(task.elapsed or 0.0, self._expected))
 
 
-def left(elapsed: float, expected: float | None) -> str:
+def remaining_text(elapsed: float, expected: float | None) -> str:
     """Elapsed time and, if the duration was measured before, remaining time, in words; both [s]."""
     if expected is None:
         return f"{elapsed:.0f} s"
@@ -56,7 +56,7 @@ def working(what: str, share: float = 1.0) -> Generator[None]:
         yield
     taken = time.perf_counter() - began
     if taken > _MIN_STORED_DURATION:
-        keep_seconds(what, taken / share)
+        store_duration(what, taken / share)
 
 
 @contextmanager
@@ -89,7 +89,7 @@ def _stored_durations() -> dict[str, float]:
     return {name: float(value) for name, value in items if isinstance(value, int | float) and value > 0.0}
 
 
-def keep_seconds(what: str, seconds: float) -> None:
+def store_duration(what: str, seconds: float) -> None:
     """Store the duration of one unit of some work [s]; a file that cannot be written is ignored."""
     try:
         _durations_file().parent.mkdir(parents=True, exist_ok=True)

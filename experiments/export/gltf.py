@@ -15,7 +15,7 @@ from controllers.state import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.motion.clip import Clip
-from sim.viewer.shapes import body_shapes, coarser
+from sim.viewer.shapes import body_shapes, simplify_shapes
 
 _AXIS_ORDER = [1, 2, 0]
 _FLOAT, _UNSIGNED_BYTE, _UNSIGNED_SHORT, _UNSIGNED_INT = 5126, 5121, 5123, 5125
@@ -115,7 +115,7 @@ def _add_skin(library: Any, document: Any, buffer: _Buffer, model: mujoco.MjMode
     """Add a mesh of the visible shapes of the figure at rest; each vertex is bound to one joint."""
     bodies = {int(model.body(segment.body).id): k for k, segment in enumerate(SEGMENTS)}
     by_color: dict[tuple[float, ...], list[tuple[int, Array, IntArray]]] = {}
-    for shape in coarser(body_shapes(model, ""), _DETAIL_SIZE):
+    for shape in simplify_shapes(body_shapes(model, ""), _DETAIL_SIZE):
         by_color.setdefault(shape.rgba, []).append((bodies[shape.body], shape.vertices, shape.faces))
     primitives: list[Any] = []
     for color, shapes in by_color.items():

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
-from experiments.files.whole_file import whole_file
+from experiments.files.whole_file import atomic_file
 
 
-def kept_array(
+def cached_array(
     folder: Path,
     name: str,
     made_of: Iterable[npt.NDArray[np.generic]],
@@ -46,8 +46,8 @@ def kept_array(
     return found
 
 
-def is_kept(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
-    """Whether `kept_array` would return a cached array."""
+def is_cached(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
+    """Whether `cached_array` would return a cached array."""
     return _read(_cache_file(folder, name, made_of), shape) is not None
 
 
@@ -81,5 +81,5 @@ def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
 def _write(path: Path, content: bytes) -> None:
     """Write a file atomically, also when two processes write it at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(content)

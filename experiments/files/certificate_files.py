@@ -4,14 +4,14 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from controllers.certificates.flight.tolerance import Judging
+from controllers.certificates.flight.tolerance import JudgementCriteria
 from controllers.certificates.report import Certificate, CertificateError, ChangedInputs
 from experiments.files.json_text import json_text
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import sources_hash
 
 
-def clip_inputs(clip: Clip, judging: Judging) -> dict[str, object]:
+def clip_inputs(clip: Clip, judging: JudgementCriteria) -> dict[str, object]:
     """All inputs of the verdicts on a clip, by name, for `hash_of`."""
     return {"clip": (clip.fps, clip.poses), "judging": judging, "code": code_inputs()}
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
-from experiments.files.whole_file import whole_file
+from experiments.files.whole_file import atomic_file
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
-from sim.hardware.identification import NAMES, Identified
+from sim.hardware.identification import NAMES, IdentificationResult
 from sim.world.linkage import Linkage, Triple
 
 _JOINT_QUANTITIES = ("coulomb", "viscous", "inertia")
@@ -53,7 +53,9 @@ class Calibration(NamedTuple):
         return ""
 
 
-def identified_json(found: Identified, recordings: Sequence[str], base: Mapping[str, object]) -> dict[str, object]:
+def identified_json(
+    found: IdentificationResult, recordings: Sequence[str], base: Mapping[str, object]
+) -> dict[str, object]:
     """Content of a device file with identified parameters: value and half interval of each quantity, in SI units.
 
     Parameters
@@ -100,7 +102,7 @@ def calibrated_json(
 
 def save_device(content: Mapping[str, object], path: Path) -> None:
     """Write a device file; an existing one is replaced, once all is written."""
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(f"{json_text(content)}\n".encode())
 
 

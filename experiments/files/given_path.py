@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from controllers.errors import ParameterError
 
 
@@ -14,7 +14,7 @@ def given_path(name: str, value: str | Path) -> Path:
     ParameterError
         If it is neither text nor a path, is empty, or has a null character.
     """
-    of_kind(name, value, str | Path)
+    check_kind(name, value, str | Path)
     if not str(value):
         raise ParameterError(f"{name} is empty; expected a path")
     if "\0" in str(value):

@@ -13,7 +13,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
-from experiments.files.whole_file import whole_file
+from experiments.files.whole_file import atomic_file
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
@@ -41,7 +41,7 @@ def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
 
 def write_arrays(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
     """Write a map's arrays by key with its class name `kind`; an existing file is replaced, once all are written."""
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         # Arrays are stored under numbers, as a key need not be a valid file name.
         numbered = {str(i): value for i, value in enumerate(arrays.values())}
         np.savez(

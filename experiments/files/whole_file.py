@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 
 @contextmanager
-def whole_file(path: Path) -> Generator[BinaryIO]:
+def atomic_file(path: Path) -> Generator[BinaryIO]:
     """A file to be written that takes the place of `path` once it is closed; until then, `path` is as it was.
 
     Whatever interrupts the block (an error, a full disk, Ctrl-C) removes it. Two processes may write at once.

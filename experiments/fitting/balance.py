@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.sole_heights import SWINGS
+from controllers.legs.sole_heights import SWING_HEIGHT
 from controllers.state import Array
-from experiments.files.array_cache import kept_array
+from experiments.files.array_cache import cached_array
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
-from sim.compilation.sources import kept_folder
+from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
 _LAP_SAMPLES = 96  # samples of a lap
@@ -52,12 +52,12 @@ class Laps(NamedTuple):
 
     def outside(self) -> Array:
         """Vectors from zero-moment points to nearest supported ones [m] times the load [body weights], (k, n, 2)."""
-        touching = self.contacts[..., 2] < SWINGS
+        touching = self.contacts[..., 2] < SWING_HEIGHT
         nearest = nearest_supported(self.zmp, self.contacts[..., :2], touching, _SUPPORT_SCALE)
         return self.load[..., None] * (nearest - self.zmp)
 
 
-def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
+def with_balance(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cylindrical:
     """The same map with a root that sways between the clips; the result is cached beside the compiled code.
 
     Parameters
@@ -74,7 +74,7 @@ def balanced(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Cyl
     mujoco.mj_saveModel(figure, None, model)
     made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]))
     return haptic_map.with_sway(
-        kept_array(kept_folder(__name__), "sway", made_of, shape, lambda: _compute_sway(haptic_map, figure, lap))
+        cached_array(results_folder(__name__), "sway", made_of, shape, lambda: _compute_sway(haptic_map, figure, lap))
     )
 
 

@@ -12,9 +12,9 @@ from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import sole_points
 from sim.body.figure_state import FigureGains
 
-LONGEST_FLIGHT = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
-FLYING_SLOWEST, FLYING_FASTEST = 0.9, 1.1  # the same for clips with flights, which then need 0.8 to 1.2 of gravity
-SLOWEST, FASTEST = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
+MAX_FLIGHT_TIME = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
+MIN_FLYING_PACE, MAX_FLYING_PACE = 0.9, 1.1  # the same for clips with flights, which then need 0.8 to 1.2 of gravity
+MIN_PACE, MAX_PACE = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
 _LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natural_lap` takes the shortest of them
 
 
@@ -39,12 +39,12 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
         if clip.turns_over:
             fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.least_upright)):.0f}° from upright)"
             lines.append(f"{clip.name} {fault}: no motion lies between it and others")
-        elif flight > LONGEST_FLIGHT:
+        elif flight > MAX_FLIGHT_TIME:
             lines.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")
     return tuple(lines)
 
 
-def grounded(clips: Sequence[Clip]) -> int:
+def timing_clip(clips: Sequence[Clip]) -> int:
     """Index of the clip that times the lap: the first without a flight, or else the first.
 
     Which clip's legs are combined with the arms of the others is found with the physical figure (`carried`): arms move
@@ -57,14 +57,14 @@ def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool
     """Whether a lap [s] plays all clips near enough to their own pace to be blended; flights have tighter limits."""
     paces = [loop.duration / lap for loop in loops]
     any_flight = any(longest_flight(clip) > 0.0 for clip in clips)
-    slowest, fastest = (FLYING_SLOWEST, FLYING_FASTEST) if any_flight else (SLOWEST, FASTEST)
+    slowest, fastest = (MIN_FLYING_PACE, MAX_FLYING_PACE) if any_flight else (MIN_PACE, MAX_PACE)
     return all(slowest <= pace <= fastest for pace in paces)
 
 
 def keep_own_pace(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> bool:
     """Whether a round [s] plays every clip near enough to its own pace to be followed by itself."""
     return all(
-        (FLYING_SLOWEST if longest_flight(clip) > 0.0 else SLOWEST) <= loop.duration / seconds <= FLYING_FASTEST
+        (MIN_FLYING_PACE if longest_flight(clip) > 0.0 else MIN_PACE) <= loop.duration / seconds <= MAX_FLYING_PACE
         for clip, loop in zip(clips, loops, strict=True)
     )
 
@@ -74,12 +74,12 @@ def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
     return [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
 
 
-def furthest_off(loops: Sequence[Loop], seconds: float) -> float:
+def largest_pace_error(loops: Sequence[Loop], seconds: float) -> float:
     """Largest |log| of the ratio of the pace at which a round [s] plays a loop to the loop's own pace."""
     return max(abs(float(np.log(loop.duration / seconds))) for loop in loops)
 
 
-def led_by(first: int, loops: Sequence[Loop]) -> list[Loop]:
+def with_loop_first(first: int, loops: Sequence[Loop]) -> list[Loop]:
     """The loops with the one of index `first` moved to the front."""
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
@@ -91,10 +91,10 @@ def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int
     pace an advised lap keeps.
     """
     paces = {clip.name: loop.duration / (laps * lap) for clip, loop in zip(clips, loops, strict=True)}
-    outside = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not SLOWEST <= pace <= FASTEST]
+    outside = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not MIN_PACE <= pace <= MAX_PACE]
     if not outside:
         return ()
-    best = natural_lap(led_by(timing, closed_loops(clips)))
+    best = natural_lap(with_loop_first(timing, closed_loops(clips)))
     better = (
         f"--lap {best:.1f} suits them best"
         if abs(best / lap - 1.0) > _LAP_TOLERANCE

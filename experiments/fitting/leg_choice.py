@@ -19,20 +19,20 @@ from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import Array
-from experiments.files.array_cache import kept_array
-from experiments.fitting.similarity import SKATES, motion_of
-from experiments.fitting.verdict import BEARABLE, FPS, SECONDS, Verdict, tried
+from experiments.files.array_cache import cached_array
+from experiments.fitting.similarity import MAX_FOOT_SKATE, motion_of
+from experiments.fitting.verdict import FPS, MAX_RESIDUAL, SECONDS, Verdict, cached_verdict
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from sim.compilation.sources import kept_folder
+from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
 SHARES = (1.0, 0.5, 0.25, 0.0)
-WELL = BEARABLE / 2  # [body weights] RMS residual up to which the first clip is taken at once
+GOOD_RESIDUAL = MAX_RESIDUAL / 2  # [body weights] RMS residual up to which the first clip is taken at once
 # Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and largest excess of a joint [rad].
-SINKS, BEYOND = 0.01, np.deg2rad(5.0)
+MAX_PENETRATION, MAX_JOINT_EXCESS = 0.01, np.deg2rad(5.0)
 _PUSH_OFFSET = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
-EVERY, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
+PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
 
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
@@ -41,10 +41,10 @@ Carrying = TypeVar("Carrying", Cylindrical, Composite)
 def verdict_on(made: Cylindrical | Composite, lap: float, parallel: bool) -> Verdict:
     """How the physical figure follows a map about a circle for 20 s; cached, and needs compiled code."""
     made_of = (made.compiled().params, np.array([lap, parallel, *_domain(made).ravel()]))
-    return tried(__name__, lambda: toured(made, lap, parallel), SECONDS, made_of)
+    return cached_verdict(__name__, lambda: tour_animation(made, lap, parallel), SECONDS, made_of)
 
 
-def unbearable(made: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
+def single_clip_remarks(made: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
     """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
     verdict = verdict_on(made, lap, parallel)
     return () if verdict.bearable else (f"the physical figure {verdict} with {name} at this lap",)
@@ -55,7 +55,7 @@ def _domain(made: Cylindrical | Composite) -> Array:
     return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
 
 
-def toured(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
+def tour_animation(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
@@ -78,21 +78,21 @@ def toured(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
 
 def push_profile(times: Array) -> Array:
     """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
-    phase = times / EVERY % 2.0
-    ramp = np.minimum(phase, 2.0 - phase) * EVERY / _PUSH_TIME
-    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * EVERY) % 2.0 == 0.0, 1.0, -1.0))
+    phase = times / PUSH_INTERVAL % 2.0
+    ramp = np.minimum(phase, 2.0 - phase) * PUSH_INTERVAL / _PUSH_TIME
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * PUSH_INTERVAL) % 2.0 == 0.0, 1.0, -1.0))
 
 
-def sound(made: Cylindrical | Composite, lap: float, parallel: bool) -> bool:
-    """Whether the animation of `toured` is sound (`is_sound`)."""
+def animation_is_sound(made: Cylindrical | Composite, lap: float, parallel: bool) -> bool:
+    """Whether the animation of `tour_animation` is sound (`is_sound`)."""
     made_of = (made.compiled().params, np.array([lap, parallel, *_domain(made).ravel()]))
-    return is_sound(__name__, lambda: toured(made, lap, parallel), made_of)
+    return is_sound(__name__, lambda: tour_animation(made, lap, parallel), made_of)
 
 
 def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArray[np.generic]]) -> bool:
     """Whether soles neither penetrate the floor nor skate and joints stay within their ranges, within tolerances.
 
-    The result is cached; needs compiled code. The arguments are those of `tried`.
+    The result is cached; needs compiled code. The arguments are those of `cached_verdict`.
     """
 
     def find() -> Array:
@@ -100,11 +100,11 @@ def is_sound(module: str, show: Callable[[], Clip], made_of: Iterable[npt.NDArra
         motion = motion_of(shown.poses, shown.fps)
         return np.array([[motion.lowest, motion.skate, beyond_ranges(shown.poses).max()]])
 
-    lowest, skate, beyond = kept_array(kept_folder(module), "sound", made_of, (1, 3), find)[0]
-    return bool(lowest > -SINKS and skate <= SKATES and beyond < BEYOND)
+    lowest, skate, beyond = cached_array(results_folder(module), "sound", made_of, (1, 3), find)[0]
+    return bool(lowest > -MAX_PENETRATION and skate <= MAX_FOOT_SKATE and beyond < MAX_JOINT_EXCESS)
 
 
-def carried(
+def select_legs(
     make: Callable[[int], Carrying], names: Sequence[str], lap: float, parallel: bool
 ) -> tuple[Carrying, tuple[str, ...]]:
     """The map with the legs that best carry the other clips' arms, and remarks; needs compiled code.
@@ -124,7 +124,7 @@ def carried(
 
     @cache
     def has_sound_legs(i: int) -> bool:
-        return sound(map_with_legs(i).with_share(0.0), lap, parallel)
+        return animation_is_sound(map_with_legs(i).with_share(0.0), lap, parallel)
 
     best, name, best_verdict = map_with_legs(0), names[0], Verdict(np.inf, 0.0)
     for soundness in (True, False):
@@ -132,7 +132,7 @@ def carried(
             for i in (i for i in range(len(names)) if has_sound_legs(i) is soundness):
                 made = map_with_legs(i).with_share(share)
                 verdict = verdict_on(made, lap, parallel)
-                if verdict.bearable and verdict.residual <= WELL:
+                if verdict.bearable and verdict.residual <= GOOD_RESIDUAL:
                     return made, ()
                 if verdict.worse() < best_verdict.worse():
                     best, name, best_verdict = made, names[i], verdict

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array, stylus_path
-from experiments.fitting.leg_choice import EVERY, SHARES, WELL, is_sound, push_profile
-from experiments.fitting.verdict import FPS, SECONDS, Verdict, tried
+from experiments.fitting.leg_choice import GOOD_RESIDUAL, PUSH_INTERVAL, SHARES, is_sound, push_profile
+from experiments.fitting.verdict import FPS, SECONDS, Verdict, cached_verdict
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 
@@ -29,7 +29,7 @@ def toured(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     its angular speed is lower the further out it is.
     """
     times = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
-    pushed = _PUSH_OFFSET * push_profile(np.maximum(times - EVERY, 0.0))
+    pushed = _PUSH_OFFSET * push_profile(np.maximum(times - PUSH_INTERVAL, 0.0))
     elapsed = times if keeps_pace else _slowed_phase(curve, pushed)
     phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
     points = curve.point(curve.start + phases)
@@ -70,7 +70,7 @@ def followed_map(
         return part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
 
     def verdict_on(part: Lifted) -> Verdict:
-        return tried(__name__, lambda: toured(part, curve, keeps_pace), SECONDS, made_of(part))
+        return cached_verdict(__name__, lambda: toured(part, curve, keeps_pace), SECONDS, made_of(part))
 
     whole = verdict_on(made)
     sound = not whole.bearable or is_sound(__name__, lambda: toured(made, curve, keeps_pace), made_of(made))
@@ -82,7 +82,7 @@ def followed_map(
         verdict = verdict_on(part)
         if verdict.worse() < best_verdict.worse():
             best, best_verdict = part, verdict
-        if best_verdict.bearable and best_verdict.residual <= WELL:
+        if best_verdict.bearable and best_verdict.residual <= GOOD_RESIDUAL:
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"

@@ -5,8 +5,8 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.haptic_map.river_memory import RIVER
-from controllers.legs.sole_heights import STANDS, SWINGS
+from controllers.haptic_map.river_memory import ACTIVE_RIVER
+from controllers.legs.sole_heights import STANCE_HEIGHT, SWING_HEIGHT
 from controllers.state import stylus_path
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported
@@ -37,15 +37,15 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
     for river, curve in enumerate(clips.curves):
         phases = curve.start + curve.duration * np.arange(rows) / _LAP_SAMPLES
         memory = clips.compiled().memory
-        memory[RIVER] = river
+        memory[ACTIVE_RIVER] = river
         for i, pose in enumerate(map_poses(clips, stylus_path(curve.point(phases)), memory)):
             data.qpos[:] = pose
             mujoco.mj_kinematics(figure, data)
             mujoco.mj_comPos(figure, data)
             centre[i], contacts[i] = data.subtree_com[1, :2], data.geom_xpos[feet]
         contacts[..., 2] -= CONTACT_RADIUS
-        touching = contacts[..., 2] < STANDS
-        nearest = nearest_supported(centre, contacts[..., :2], contacts[..., 2] < SWINGS, _SUPPORT_SCALE)
+        touching = contacts[..., 2] < STANCE_HEIGHT
+        nearest = nearest_supported(centre, contacts[..., :2], contacts[..., 2] < SWING_HEIGHT, _SUPPORT_SCALE)
         distance = np.linalg.norm(nearest - centre, axis=1)
         distance[~touching.any(axis=1)] = _FLIGHT_DISTANCE
         # FOOT_CONTACTS begins with the four points of the left foot.

@@ -14,26 +14,26 @@ import numpy as np
 from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange
-from controllers.haptic_map.river_clips import LONGEST, RiverClips
-from controllers.haptic_map.river_memory import PHASE, RIVER
+from controllers.haptic_map.river_clips import MAX_CHANGE_FRACTION, RiverClips
+from controllers.haptic_map.river_memory import ACTIVE_RIVER, HAND_PHASE
 from controllers.state import Array, stylus_path
 from experiments.console.progress import working
-from experiments.files.array_cache import is_kept, kept_array
+from experiments.files.array_cache import cached_array, is_cached
 from experiments.fitting.figure_legs import packed_legs
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.feasible import Feasible, borne, feasible
+from models.mocap.preparation.feasible import Feasible, contact_forces, feasible
 from models.mocap.preparation.stances import Stances, stances
-from sim.compilation.side_by_side import side_by_side
-from sim.compilation.sources import kept_folder
+from sim.compilation.side_by_side import run_in_workers
+from sim.compilation.sources import results_folder
 from sim.reference.reference import make_reference, map_poses, reference_along
 
-_LEAD, _TAIL = 0.7, 0.9  # [s] optimised time before and after a change
+_TIME_BEFORE, _TIME_AFTER = 0.7, 0.9  # [s] optimised time before and after a change
 _SETTLING, _BANDWIDTH = 1.0, 40.0  # [s] settling time and [Hz] cut-off of the stylus filter, too high to show
 _BLOCK = 6  # frames between two checks of whether the clip has changed
 _ITERATIONS = 10
 _CONTEXT = 0.5  # [s] context on either side of a change, for the detection of its stances
-_MOMENTS = 8  # moments of a stride at which a change by offsets is tried
+_N_MOMENTS = 8  # moments of a stride at which a change by offsets is tried
 # Maximum number of them that are made feasible, and the cost below which no more are tried. With 12 iterations, three
 # tries and waits of 2.4 s, which take longer, the figure stayed up on eight of eight sets of captures; with these
 # numbers it does on seven or eight.
@@ -117,11 +117,13 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
         stride = made.round_seconds(first) / strides
         parts = max(min(int(np.ceil(stride / _TARGET_WAIT_TIME)), _MAX_GATES), int(np.ceil(stride / _MAX_WAIT_TIME)))
         span = stride / parts
-        gates += [_Gate(first, second, k, strides, span * (k + np.arange(_MOMENTS) / _MOMENTS)) for k in range(parts)]
-    missing = [gate for gate in gates if not is_kept(kept_folder(__name__), gate.name, made_of, (-1, 57))]
+        gates += [
+            _Gate(first, second, k, strides, span * (k + np.arange(_N_MOMENTS) / _N_MOMENTS)) for k in range(parts)
+        ]
+    missing = [gate for gate in gates if not is_cached(results_folder(__name__), gate.name, made_of, (-1, 57))]
     if missing:
         with working("making rivers' changes feasible", len(missing)):
-            side_by_side([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
+            run_in_workers([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
     changes: list[ClipChange] = []
     for gate in gates:
         rows, period = _cached_change(one_river, made_of, blend, figure, gate), made.round_seconds(gate.first)
@@ -139,7 +141,7 @@ def _cached_change(
     def find() -> Array:
         return _change(made, blend, figure, gate.first, gate.second, gate.moments)
 
-    return kept_array(kept_folder(__name__), gate.name, made_of, (-1, 57), find)
+    return cached_array(results_folder(__name__), gate.name, made_of, (-1, 57), find)
 
 
 def _stride_count(made: RiverClips, first: int, second: int) -> int:
@@ -159,14 +161,14 @@ def _stride_count(made: RiverClips, first: int, second: int) -> int:
 def _clip_poses(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
     """Poses of a river's clip at phases [s] after the start of the round, beginning with a given memory of the map."""
     curve, start_memory = made.curves[river], _memory_at(made, phases[0]) if memory is None else memory.copy()
-    start_memory[RIVER] = river
+    start_memory[ACTIVE_RIVER] = river
     return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), start_memory)
 
 
 def _memory_at(made: RiverClips, phase: float) -> Array:
     """Memory of a run that begins at a phase [s] after the start of the round."""
     memory, start = made.compiled().memory, made.curves[0].start
-    memory[PHASE] = start + phase % made.round_seconds(0)
+    memory[HAND_PHASE] = start + phase % made.round_seconds(0)
     return memory
 
 
@@ -176,23 +178,25 @@ def _make_passage(
     """The transition from one river's clip to another's at or soon after a moment of the round [s]; None if none."""
     curve, period = made.curves[first], made.round_seconds(first)
     lap = curve.duration
-    times = period + moment - _LEAD - _CONTEXT - _SETTLING + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
+    times = (
+        period + moment - _TIME_BEFORE - _CONTEXT - _SETTLING + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
+    )
     stylus = stylus_path(curve.point(curve.start + times % lap))
     traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
     traces[:, TRACE_RIVER] = np.where(times < period + moment, first, second)
     traces[:, TRACE_PHASE] = curve.start + times % lap
     compiled = made.compiled()._replace(memory=_memory_at(made, times[0]))
-    compiled.memory[RIVER] = first
+    compiled.memory[ACTIVE_RIVER] = first
     reference = make_reference(figure, compiled, 1.0 / FPS, _BANDWIDTH, blend, packed_legs(figure))
-    changed, tail = None, round((_TAIL + _CONTEXT) * FPS)
+    changed, tail = None, round((_TIME_AFTER + _CONTEXT) * FPS)
     for k in range(0, len(times) - tail, _BLOCK):
         part = slice(k, k + _BLOCK)
         reference_along(reference, stylus[part], traces[part], poses[part])
-        changed = k if changed is None and reference.memory[RIVER] == second else changed
+        changed = k if changed is None and reference.memory[ACTIVE_RIVER] == second else changed
         if changed is not None and reference.transition.since[0] >= reference.transition.lasts[0]:
             rest = slice(part.stop, part.stop + tail)
             reference_along(reference, stylus[rest], traces[rest], poses[rest])
-            rows = np.arange(changed - round((_LEAD + _CONTEXT) * FPS), rest.stop)
+            rows = np.arange(changed - round((_TIME_BEFORE + _CONTEXT) * FPS), rest.stop)
             second_poses = _clip_poses(made, second, times[rows[::-1]], reference.memory)[::-1]
             return _Passage(poses[rows], second_poses, float((times[rows[0]] + _CONTEXT) % period))
     return None
@@ -201,11 +205,11 @@ def _make_passage(
 def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
     """The gate [s] as a first row, then the offsets (n, 57) of the transition that begins there; (0, 57) if none."""
     passages = [_make_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
-    longest = LONGEST * made.round_seconds(first)
+    longest = MAX_CHANGE_FRACTION * made.round_seconds(first)
     usable = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not usable:
         return np.zeros((0, 57))
-    usable.sort(key=lambda passage: borne(passage.clip(), passage.stances(), passage=True).residual)
+    usable.sort(key=lambda passage: contact_forces(passage.clip(), passage.stances(), passage=True).residual)
     candidates: list[tuple[_Passage, Feasible]] = []
     for passage in usable[:_MAX_TRIES]:
         candidates.append((passage, feasible(passage.clip(), passage.stances(), _ITERATIONS, FPS, passage=True)))
@@ -217,7 +221,7 @@ def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, 
     shown = slice(core.start - round(LEAD_IN * FPS), core.stop)
     offsets = _pose_offsets(best.second[shown], poses[shown])
     # Offsets at the end are only due to the lag of the stylus filter: fade them out.
-    left = np.arange(len(offsets))[::-1] / (0.5 * _TAIL * FPS)
+    left = np.arange(len(offsets))[::-1] / (0.5 * _TIME_AFTER * FPS)
     offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
     if np.abs(np.diff(offsets, axis=0)).max() > _MAX_ROW_STEP:
         return np.zeros((0, 57))

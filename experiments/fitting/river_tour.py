@@ -11,22 +11,25 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
-from experiments.fitting.verdict import FPS, tried
+from experiments.fitting.verdict import FPS, cached_verdict
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
-_STAY, _GLIDE = 5.5, 0.3  # [s] on a river, enough for a gate and the transition; [s] from one river to the next
-_DURATION = _STAY * len(_ORDER)
+_DWELL_TIME, _TRANSFER_TIME = (
+    5.5,
+    0.3,
+)  # [s] on a river, enough for a gate and the transition; [s] from one river to the next
+_DURATION = _DWELL_TIME * len(_ORDER)
 
 
 def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     """The animation of a hand that moves at the rivers' pace and makes each change between two of the rivers once."""
     # The stylus filter begins at rest: its first second is dropped.
     times = np.arange(round((_DURATION + 2.0) * FPS)) / FPS - 1.0
-    stop = np.clip(times // _STAY, 0, len(_ORDER) - 1).astype(int)
+    stop = np.clip(times // _DWELL_TIME, 0, len(_ORDER) - 1).astype(int)
     order = np.array(_ORDER)
-    share = smooth_steps((times - _STAY * stop) / _GLIDE)[:, None]
+    share = smooth_steps((times - _DWELL_TIME * stop) / _TRANSFER_TIME)[:, None]
     phases = np.array([curve.start + times % curve.duration for curve in made.curves])
     points = np.array([curve.point(phase) for curve, phase in zip(made.curves, phases, strict=True)])
     rows = np.arange(len(times))
@@ -53,10 +56,11 @@ def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: m
         Model of the figure alone.
     """
     made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
-    verdict = tried(__name__, lambda: toured(made, part, figure), _DURATION, made_of)
+    verdict = cached_verdict(__name__, lambda: toured(made, part, figure), _DURATION, made_of)
     if verdict.bearable:
         return ()
-    stop = min(int(verdict.fell // _STAY), len(_ORDER) - 1) if verdict.falls else 0
-    after = f", {verdict.fell - _STAY * stop:.1f} s after {names[_ORDER[stop - 1]]} gives way to {names[_ORDER[stop]]}"
+    stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0
+    change = f"{names[_ORDER[stop - 1]]} gives way to {names[_ORDER[stop]]}"
+    after = f", {verdict.fell - _DWELL_TIME * stop:.1f} s after {change}"
     where = after if stop else ", before any river changes" if verdict.falls else ""
     return (f"from river to river the physical figure {verdict}{where}",)

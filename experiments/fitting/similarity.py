@@ -14,16 +14,18 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
 from controllers.state import Array
-from experiments.files.array_cache import kept_array
+from experiments.files.array_cache import cached_array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
-from sim.compilation.sources import kept_folder
+from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
-SKATES = 0.02
+MAX_FOOT_SKATE = 0.02
 """Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
 
-LACKS = 0.06  # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `SKATES`
+MAX_EXCESS_RESIDUAL = (
+    0.06  # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `MAX_FOOT_SKATE`
+)
 _FPS = 60.0
 _TRUNK_BODIES = ("abdomen", "chest")
 _MIDDLE, _CORNERS = (0.5, 0.5), ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))  # shares of the domain in r and z
@@ -56,14 +58,14 @@ def upper_joints(legs: Sequence[Limb]) -> list[int]:
 def motion_of(poses: Array, fps: float) -> Motion:
     """Measure a motion (n, 75)."""
     # Imported here: they load signal processing, which a run with cached results does not need.
-    from models.mocap.preparation.feasible import borne
+    from models.mocap.preparation.feasible import contact_forces
     from models.mocap.preparation.poses import smoothed, sole_points
     from models.mocap.preparation.skate import skates
     from models.mocap.preparation.stances import stances
 
     clip = Clip(poses, fps, "blend")
     schedule = stances(clip, smoothed(clip))
-    support = borne(clip, schedule)
+    support = contact_forces(clip, schedule)
     slides, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
     return Motion(support.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
 
@@ -77,9 +79,11 @@ def moves_alike(made: Cylindrical, lap: float) -> bool:
     def find() -> Array:
         return np.array([motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
-    found = kept_array(kept_folder(__name__), "alike", (made.compiled().params, np.array([lap])), (5, 4), find)
+    found = cached_array(results_folder(__name__), "alike", (made.compiled().params, np.array([lap])), (5, 4), find)
     corner_median = np.median(found[1:], axis=0)
-    return bool(found[0, 0] < corner_median[0] + LACKS and found[0, 2] < corner_median[2] + SKATES)
+    return bool(
+        found[0, 0] < corner_median[0] + MAX_EXCESS_RESIDUAL and found[0, 2] < corner_median[2] + MAX_FOOT_SKATE
+    )
 
 
 def carries_alike(made: Composite, lap: float) -> bool:
@@ -90,8 +94,8 @@ def carries_alike(made: Composite, lap: float) -> bool:
     def find() -> Array:
         return np.array([motion_at(own, _MIDDLE, lap), *(motion_at(made, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))])
 
-    found = kept_array(kept_folder(__name__), "carries", (made.compiled().params, np.array([lap])), (4, 4), find)
-    return bool(found[1:, 0].max() < found[0, 0] + LACKS)
+    found = cached_array(results_folder(__name__), "carries", (made.compiled().params, np.array([lap])), (4, 4), find)
+    return bool(found[1:, 0].max() < found[0, 0] + MAX_EXCESS_RESIDUAL)
 
 
 def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:

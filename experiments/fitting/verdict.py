@@ -8,13 +8,13 @@ import numpy.typing as npt
 
 from controllers.state import Array
 from experiments.console.progress import working
-from experiments.files.array_cache import kept_array
+from experiments.files.array_cache import cached_array
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.bounds import FLYING
-from sim.compilation.sources import kept_folder
+from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
+from sim.compilation.sources import results_folder
 from sim.compilation.unit_workers import compile_units
 
-BEARABLE = FLYING
+MAX_RESIDUAL = RESIDUAL_IN_FLIGHTS
 """Largest acceptable RMS of the residual force [body weights]."""
 
 SECONDS, FPS = 20.0, 120.0
@@ -42,8 +42,8 @@ class Verdict(NamedTuple):
 
     @property
     def bearable(self) -> bool:
-        """Whether it does not fall and its residual is at most `BEARABLE`."""
-        return not self.falls and self.residual <= BEARABLE
+        """Whether it does not fall and its residual is at most `MAX_RESIDUAL`."""
+        return not self.falls and self.residual <= MAX_RESIDUAL
 
     def worse(self) -> tuple[float, float]:
         """Sort key that is larger for a worse verdict: first by an earlier fall, then by the residual."""
@@ -54,7 +54,9 @@ class Verdict(NamedTuple):
         return f"falls at {self.fell:.1f} s" if self.falls else f"lacks {100 * self.residual:.0f} % of weight"
 
 
-def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterable[npt.NDArray[np.generic]]) -> Verdict:
+def cached_verdict(
+    module: str, show: Callable[[], Clip], seconds: float, made_of: Iterable[npt.NDArray[np.generic]]
+) -> Verdict:
     """Let the physical figure follow an animation, and cache the verdict; needs compiled code.
 
     Parameters
@@ -76,4 +78,4 @@ def tried(module: str, show: Callable[[], Clip], seconds: float, made_of: Iterab
             result = followed(show(), seconds, compile_units)
         return np.array([[result.residual, np.inf if result.fell is None else result.fell]])
 
-    return Verdict(*kept_array(kept_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())
+    return Verdict(*cached_array(results_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())

@@ -14,9 +14,9 @@ from controllers.certificates.flight.ballistic import (
     judge_flights,
 )
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
-from controllers.certificates.flight.flight_fit import FlightFit, best_fall, find_flights
+from controllers.certificates.flight.flight_fit import FlightFit, find_flights, fit_free_fall
 from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
-from controllers.certificates.flight.tolerance import JUDGING, Judging
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
@@ -150,7 +150,7 @@ def _is_in_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
 
 def clip_ballistics(
     clip: Clip,
-    judging: Judging = JUDGING,
+    judging: JudgementCriteria = DEFAULT_CRITERIA,
     assumptions: tuple[str, ...] = (),
 ) -> ClipBallistics:
     """Certify the flights of a clip, and that friction suffices for its turns outside flights.
@@ -198,7 +198,7 @@ def _play_flight(clip: Clip, fit: FlightFit, rate: float) -> _PlayedFlight:
     times = np.arange(n + _FRAMES_AFTER_LANDING) * fit.duration / (n - 1)
     recorded = Clip(clip_motion(clip, fit.time + times).poses, rate / float(times[1]), clip.name)
     dynamics = momentum(recorded)
-    distance, (p, v) = best_fall(dynamics.com[:n], recorded.fps / rate, rate)
+    distance, (p, v) = fit_free_fall(dynamics.com[:n], recorded.fps / rate, rate)
     rotation = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
     for k in range(len(times) - 1):
         R = Rotation.from_quat(rotation[k], scalar_first=True)

@@ -14,7 +14,7 @@ from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved_momentum import with_constant_momentum
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
+from models.mocap.dynamics.moved_legs import displaced_with_planted_feet, hip_to_ankle
 from models.mocap.library import check_target, load_clip, writing
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
@@ -106,7 +106,7 @@ def repair_clip(clip: Clip) -> Repaired:
     first, last = min([first, *(a for a, _ in window_flights)]), max([last, *(b for _, b in window_flights)])
     window = slice(first, last + 1)
     dynamics, floor = momentum(clip), contacts(clip)
-    lines, leg = leg_lines(clip.poses)
+    lines, leg = hip_to_ankle(clip.poses)
     plan = repair(
         RepairTask(
             fps=clip.fps, com=dynamics.com[window], angular=dynamics.angular[window], clearance=floor.clearance[window],
@@ -134,7 +134,7 @@ def _apply_plan(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[in
     shifts = np.asarray(PchipInterpolator(times, shift)(frames))
     planted = np.stack([np.interp(frames, times, _planted_weight(times, foot)) for foot in standing.T], axis=1)
     for _ in range(3):
-        com = momentum(Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)).com
+        com = momentum(Clip(displaced_with_planted_feet(poses, shifts, planted), clip.fps, clip.name)).com
         for (start, end), (p, v) in zip(flights, plan.falls, strict=True):
             t = frames - times[start]
             fall = p + v * t[:, None] - np.outer(GRAVITY / 2.0 * t**2, (0.0, 0.0, 1.0))
@@ -144,7 +144,7 @@ def _apply_plan(clip: Clip, plan: RepairPlan, first: int, flights: list[tuple[in
             for edge, side in ((flying[0], slice(None, flying[0])), (flying[-1], slice(flying[-1] + 1, None))):
                 correction[side] = correction[edge] * _fade_weight(np.abs(frames[side] - frames[edge]))[:, None]
             shifts = shifts + correction
-    moved = Clip(with_moved_body(poses, shifts, planted), clip.fps, clip.name)
+    moved = Clip(displaced_with_planted_feet(poses, shifts, planted), clip.fps, clip.name)
     spans = [np.flatnonzero((frames >= times[start]) & (frames <= times[end])) for start, end in flights]
     return with_constant_momentum(moved, [(int(flying[0]), int(flying[-1])) for flying in spans if len(flying) > 2])
 

@@ -18,7 +18,7 @@ from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
 from sim.world.linkage import Linkage
 
-STILL = 5e-3
+MAX_REST_MOTION = 5e-3
 """Largest motion of a joint while it is read [rad], about a millimetre at the tip: allows tremor but no motion."""
 _PERIOD = 1e-3  # s
 
@@ -91,9 +91,10 @@ def still_readings(driver: Driver, seconds: float) -> Array:
         raise SimError(f"{driver.identity.name} gave no reading in {seconds:g} s; expected one a millisecond")
     readings = np.array(found)
     moved = float(np.ptp(readings, axis=0).max())
-    if not moved <= STILL:
+    if not moved <= MAX_REST_MOTION:
         raise SimError(
-            f"a joint turned by {moved:.2g} rad while it was read; expected {STILL:g} or less: hold the stylus still"
+            f"a joint turned by {moved:.2g} rad while it was read; expected {MAX_REST_MOTION:g} or less: hold the "
+            "stylus still"
         )
     return readings
 

@@ -10,9 +10,9 @@ from controllers.safety.arming import State
 from experiments.files.device_files import identified_json, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import IdentifyHardware
-from experiments.results.folder import DEVICE, RECORDING, of_device
+from experiments.results.folder import DEVICE, RECORDING, is_device_recording
 from sim.errors import SimError
-from sim.hardware.identification import NAMES, Identified, Motion, identify_linkage, motions_of
+from sim.hardware.identification import NAMES, IdentificationResult, Motion, identify_linkage, motions_of
 from sim.recording.recording import Recording
 
 _SETTLING_TIME = 2.5
@@ -67,7 +67,7 @@ def recorded_motions(path: Path) -> list[Motion]:
     """
     file = path / RECORDING if path.is_dir() else path
     with Recording(file) as recording:
-        if not of_device(recording):
+        if not is_device_recording(recording):
             raise SimError(f"{file}: is no recording of a hardware run; expected one of hvf hardware run")
         tick, clock, theta, torque, state = (
             recording.channel("ticks", name)[:] for name in ("tick", "clock", "theta", "torque", "state")
@@ -83,8 +83,8 @@ def recorded_motions(path: Path) -> list[Motion]:
     return motions_of(tick, clock, theta, torque, settled)
 
 
-def lines_of(found: Identified, motions: Sequence[Motion]) -> list[str]:
-    """Identified parameters in words, one per line."""
+def lines_of(found: IdentificationResult, motions: Sequence[Motion]) -> list[str]:
+    """IdentificationResult parameters in words, one per line."""
     seconds = sum(float(motion.clock[-1] - motion.clock[0]) for motion in motions)
     lines = [
         f"{seconds:.1f} s of motion, {found.windows} windows; {found.unexplained:.2%} of the torque is unexplained."

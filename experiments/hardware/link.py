@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.state import Array
-from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, Driver
+from sim.devices.driver import JITTER, LOST, READ, REFUSED, ROUND_TRIP, STALENESS, Driver
 from sim.devices.exchange import READING_SIZE
 
 PERIOD = 1e-3
@@ -90,6 +90,6 @@ def measured_link(driver: Driver, seconds: float) -> Link:
     counts = telemetry - first
     return Link.of(
         time.monotonic() - begin,
-        (counts[READ], counts[LOST], counts[BAD]),
+        (counts[READ], counts[LOST], counts[REFUSED]),
         np.array(times) if times else np.full((1, 3), np.nan),
     )

@@ -23,7 +23,7 @@ from sim.hardware.undisturbed import parent_id
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 from sim.world.shown_phantom import show_angles, shown_phantom
 
 _POLL_INTERVAL = 1.0 / 60.0  # [s] between two polls: half the time between two images
@@ -57,7 +57,7 @@ def show_status(config: RunConfig, status: SharedNumbers, recorder_status: Share
             qpos = np.concatenate([world.data.qpos, pose])
             recorder_status.read(twin)
             hand = twin[RECORDER_FORCE : RECORDER_FORCE + 3].copy()
-            shown = Shown(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan))
+            shown = Moment(float(tick["t"]), qpos, pose[:0], tick["p"], tick["force"], hand, np.full(3, np.nan))
             page.show(shown, notes_of(tick))
         time.sleep(_POLL_INTERVAL)
 

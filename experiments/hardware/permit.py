@@ -7,18 +7,18 @@ from controllers.certificates.report import Certificate, ChangedInputs
 from controllers.errors import ParameterError
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
-from experiments.config.run_config import RunConfig, meaningless
-from experiments.config.words import given_words
+from experiments.config.run_config import RunConfig, meaningless_options
+from experiments.config.words import given_options
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
 from experiments.hardware.run_options import EMULATED, RunHardware, check_emulate
-from experiments.setups.certified_law import of_clips
+from experiments.setups.certified_law import depends_on_clips
 from models.mocap.motion.clip import Clip
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 
-HAND_PUSH = 1.0  # [N], the default of `hvf certify`
-RAMP = 0.25
+DEFAULT_HAND_PUSH = 1.0  # [N], the default of `hvf certify`
+FORCE_RAMP_TIME = 0.25
 """Shortest ramp of a real device's force [s]: the reaction time in which a surprised person lets go."""
 
 
@@ -51,12 +51,12 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
             "here and in hvf certify"
         )
     clips: tuple[Clip, ...] = ()
-    if of_clips(config):
+    if depends_on_clips(config):
         config, clips = run_and_clips(None, config)
     try:
-        found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), HAND_PUSH, clips))
+        found = verify_certificate(file, certificate_inputs(config, delay, HandRange(), DEFAULT_HAND_PUSH, clips))
     except ChangedInputs:
-        changes = changed_options(file, certified_options(config, delay, HandRange(), HAND_PUSH))
+        changes = changed_options(file, certified_options(config, delay, HandRange(), DEFAULT_HAND_PUSH))
         if not changes:
             raise
         raise ChangedInputs(f"{file} certifies another field or device: {changes}; certify this one") from None
@@ -77,8 +77,8 @@ def check_meaning(options: RunHardware) -> None:
     ParameterError
         If there is one.
     """
-    given = given_words(options.options)
-    figure = ("figure", *meaningless("kinematic", given.get("mode") == "lead"))
+    given = given_options(options.options)
+    figure = ("figure", *meaningless_options("kinematic", given.get("mode") == "lead"))
     reasons = dict.fromkeys(("user", "person"), "whoever holds the stylus is the hand; leave it out")
     reasons |= dict.fromkeys(figure, "its figure is the animation, shown beside it by --view; leave it out")
     for name in reasons:
@@ -110,9 +110,10 @@ def check_limits(options: RunHardware) -> None:
             raise SimError(
                 f"--{name} {value:g} is too much for a hand on a real device; expected at most {limit:g} {unit}"
             )
-    if options.ramp < RAMP:
+    if options.ramp < FORCE_RAMP_TIME:
         raise SimError(
-            f"--ramp {options.ramp:g} is too quick for a hand on a real device; expected {RAMP:g} s or more, a reaction"
+            f"--ramp {options.ramp:g} is too quick for a hand on a real device; expected {FORCE_RAMP_TIME:g} s or more, "
+            "a reaction"
         )
 
 

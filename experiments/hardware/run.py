@@ -28,15 +28,15 @@ from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMAR
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
-from sim.devices.hardware_list import check_there
+from sim.devices.hardware_list import check_present
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun
-from sim.hardware.emulated import emulated_identity, steps_late
+from sim.hardware.emulated import delay_in_steps, emulated_identity
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
-from sim.hardware.undisturbed import start_undisturbed
+from sim.hardware.undisturbed import start_without_sigint
 from sim.recording.recording import Recording
 
 
@@ -74,7 +74,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
     calibrated = options.emulate is None or not any(emulated_linkage.offset)
     if options.name == EMULATED:
-        steps_late(scene, emulated_linkage.delay)
+        delay_in_steps(scene, emulated_linkage.delay)
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
     session = _compile_session(config, options, console)
     job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
@@ -157,7 +157,7 @@ def _check_permit(config: RunConfig, options: RunHardware, console: Console) -> 
     """
     if options.name != EMULATED:
         check_limits(options)
-        check_there(options.name)
+        check_present(options.name)
     if options.certificate is not None:
         found = verified(options.certificate, config, options.delay)
         console.print(f"Certified: {found.verdicts['stability'].reason}", highlight=False)
@@ -176,7 +176,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
     end = EmulatedEnd(theirs, shown, make.scene.servo_period)
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=host_device, args=(make, end, realtime), name="device", daemon=True)
-    start_undisturbed(process)
+    start_without_sigint(process)
     theirs.close()
     try:
         yield ours
@@ -191,7 +191,7 @@ def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, Non
 def _serve_page(config: RunConfig, run: HardwareRun) -> Generator[None, None, None]:
     context = multiprocessing.get_context("spawn")
     page = context.Process(target=show_status, args=(config, run.status, run.recorder_status), name="page", daemon=True)
-    start_undisturbed(page)
+    start_without_sigint(page)
     try:
         yield
     finally:

@@ -18,7 +18,7 @@ from controllers.haptic_map.lifting.lift import Lifting, closes, lift
 from controllers.haptic_map.lifting.motion_features import Motion
 from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import MapTransition
-from controllers.motion.loops import checked_clip, there_and_back
+from controllers.motion.loops import append_reversal, checked_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, lap_times
 from experiments.setups.parts.clips import load_clips
@@ -26,7 +26,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import around
+from models.mocap.preparation.poses import extend_periodically
 from models.one_blas_thread import on_one_blas_thread
 from sim.errors import SimError
 from sim.world.world import phantom_angles
@@ -43,7 +43,7 @@ class LiftedClips:
     clips : tuple of Clip
         The clips as lifted.
     turned : tuple of bool
-        Whether each is followed by its reversal (`there_and_back`).
+        Whether each is followed by its reversal (`append_reversal`).
     rounds : tuple of int
         How often each is repeated in a lap.
     names : tuple of str
@@ -99,7 +99,7 @@ def check_workspace(room: Room) -> None:
 def lift_clips(
     names: Sequence[str], room: Room, cyclic: Sequence[str] = (), seed: int = 1, raw: bool = False
 ) -> LiftedClips:
-    """Lift clips by name or file; an open clip nearly at rest at both ends goes back (`there_and_back`).
+    """Lift clips by name or file; an open clip nearly at rest at both ends goes back (`append_reversal`).
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def lift_clips(
     loaded, remarks = load_clips(names, raw)
     begin = time.perf_counter()
     clips = tuple(
-        clip if name in cyclic else replace(clip, poses=there_and_back(clip.poses, clip.fps))
+        clip if name in cyclic else replace(clip, poses=append_reversal(clip.poses, clip.fps))
         for clip, name in zip(loaded, names, strict=True)
     )
     turned = tuple(clip.n_frames > as_loaded.n_frames for clip, as_loaded in zip(clips, loaded, strict=True))
@@ -147,7 +147,7 @@ def lift_clips(
 
 def _repeat(clip: Clip, times: int) -> Clip:
     """A closed clip repeated several times."""
-    poses, first = around(clip, (times - 1) * (clip.n_frames - 1))
+    poses, first = extend_periodically(clip, (times - 1) * (clip.n_frames - 1))
     return replace(clip, poses=poses[first:])
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.maps import MAP_SUFFIX
 from experiments.files.given_path import given_path
@@ -50,7 +50,7 @@ def lift_into(
         ("names", names, Sequence[str | Path]), ("room", room, Room), ("cyclic", cyclic, Sequence[str | Path]),
         ("seed", seed, int), ("overwrite", overwrite, bool), ("raw", raw, bool),
     ):  # fmt: skip
-        of_kind(name, value, kind)
+        check_kind(name, value, kind)
     out, clips = given_path("out", out), tuple(map(str, names))
     if out.suffix != MAP_SUFFIX:
         raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")

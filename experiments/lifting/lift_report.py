@@ -7,8 +7,8 @@ import numpy as np
 
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from experiments.fitting.blendable import not_blendable
-from experiments.fitting.leg_choice import BEYOND, SINKS
-from experiments.fitting.similarity import SKATES
+from experiments.fitting.leg_choice import MAX_JOINT_EXCESS, MAX_PENETRATION
+from experiments.fitting.similarity import MAX_FOOT_SKATE
 from experiments.lifting.lift import LiftedClips
 from experiments.lifting.map_quality import MapQuality, measure_map
 from experiments.lifting.motion_measure import MotionMeasure
@@ -78,8 +78,9 @@ class LiftReport(NamedTuple):
         ]
         if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
             lines.append(
-                f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * SKATES:.0f} cm, a joint is "
-                f"{np.degrees(BEYOND):.0f}° or more beyond its limits, or the body {100 * SINKS:.0f} cm below ground). "
+                f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * MAX_FOOT_SKATE:.0f} cm, a "
+                f"joint is {np.degrees(MAX_JOINT_EXCESS):.0f}° or more beyond its limits, or the body "
+                f"{100 * MAX_PENETRATION:.0f} cm below ground). "
                 "A run with the physical figure tries the map first, and plays the legs of a curve's own clip where it "
                 "does not follow the whole."
             )
@@ -126,7 +127,11 @@ def _fault_text(measure: MotionMeasure) -> str:
 
 def _is_motion(measure: MotionMeasure) -> bool:
     """Whether a measured motion keeps its feet, its joints and the floor, within the tolerances of `leg_choice`."""
-    return measure.slide <= SKATES and measure.limits <= BEYOND and measure.penetration <= SINKS
+    return (
+        measure.slide <= MAX_FOOT_SKATE
+        and measure.limits <= MAX_JOINT_EXCESS
+        and measure.penetration <= MAX_PENETRATION
+    )
 
 
 def _arrangement_data(measure: ArrangementMeasure) -> dict[str, object]:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.certificates.flight.flight_fit import best_fall, find_flights
+from controllers.certificates.flight.flight_fit import find_flights, fit_free_fall
 from experiments.results.measures.soles import Soles
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
@@ -49,5 +49,5 @@ def measure_motion(clip: Clip) -> MotionMeasure:
         limits=max(0.0, float(beyond_ranges(clip.poses).max())),
         slide=feet.slide,
         penetration=float(max(0.0, -floor.clearance.min())),
-        ballistic=max((best_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
+        ballistic=max((fit_free_fall(com[a : b + 1], clip.fps, 1.0)[0] for a, b in spans), default=0.0),
     )

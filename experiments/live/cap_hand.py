@@ -6,11 +6,11 @@ import numpy as np
 
 from controllers.state import Array
 from sim.devices.exchange import READING_SIZE, READING_SWITCH
-from sim.devices.hardware_list import found_devices, open_hid
+from sim.devices.hardware_list import list_devices, open_hid
 from sim.devices.spacemouse import SpaceMouse
 from sim.errors import SimError
 
-RESTS = 0.3  # [s] without a push of the cap, after which the hand releases the stylus
+RELEASE_DELAY = 0.3  # [s] without a push of the cap, after which the hand releases the stylus
 
 
 class CapHand:
@@ -46,7 +46,7 @@ class CapHand:
         now = time.monotonic()
         if self._mouse.pushed:
             self._last_push_time = now
-        self.holds = now - self._last_push_time < RESTS
+        self.holds = now - self._last_push_time < RELEASE_DELAY
         return (self._mouse.tip, bool(self._reading[READING_SWITCH])) if self.holds else None
 
     def close(self) -> None:
@@ -54,10 +54,10 @@ class CapHand:
         self._mouse.close()
 
 
-def cap_there() -> tuple[CapHand | None, str]:
+def open_cap_hand() -> tuple[CapHand | None, str]:
     """The first SpaceMouse of this machine, opened, or None; and a message for the user, which may be empty."""
     try:
-        found = next((device for device in found_devices() if device.kind == "spacemouse"), None)
+        found = next((device for device in list_devices() if device.kind == "spacemouse"), None)
         if found is None:
             return None, ""
         return CapHand(SpaceMouse(open_hid(found.path), found.product, found.path)), f"{found.product} moves the hand."

@@ -8,9 +8,9 @@ from controllers.errors import ParameterError
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.files.map_files import load_figure_map
-from experiments.live.gate import HERE, Gate
+from experiments.live.gate import LOCAL_HOSTS, Gate
 from experiments.live.page import Page
-from experiments.live.panels.run_panel import FOR_EVER
+from experiments.live.panels.run_panel import MAX_SESSION_DURATION
 from experiments.setups.parts.clips import load_clips
 from sim.errors import SimError
 
@@ -54,7 +54,7 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
         load_figure_map(Path(config.map.file))
     else:
         load_clips(config.map.clips, raw=True)
-    page = Page(replace(config, seconds=FOR_EVER), out, port=0)
+    page = Page(replace(config, seconds=MAX_SESSION_DURATION), out, port=0)
     try:
         gate = Gate(host, port, page.port, token)
         try:
@@ -76,7 +76,7 @@ def token_for(host: str, given: str) -> str | None:
     ParameterError
         If the given token is too easily guessed.
     """
-    if host in HERE and not given:
+    if host in LOCAL_HOSTS and not given:
         return None
     if given and (len(given) < LEAST_TOKEN or not given.isascii() or not given.isalnum()):
         raise ParameterError(f"--token is too easily guessed; expected {LEAST_TOKEN} letters and digits or more")

@@ -14,7 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from sim.errors import SimError
 
-HERE = ("127.0.0.1", "localhost", "::1")
+LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
 _COOKIE = "hvf_token"
 _HEAD_TIMEOUT = 10.0  # [s] for the head of a request
 _MAX_BYTES = 65536  # largest head of a request, and largest chunk that is piped
@@ -70,7 +70,7 @@ def answer(request: Request, token: str | None) -> bytes | None:
         return _response(403, "Forbidden", "This page is not to be used by another one.")
     if token is None:
         # A foreign host name that resolves to this machine (DNS rebinding) is refused.
-        local = urlsplit(f"//{host}").hostname in HERE
+        local = urlsplit(f"//{host}").hostname in LOCAL_HOSTS
         return None if local else _response(403, "Forbidden", "Open this page as http://127.0.0.1 or http://localhost.")
     parts = urlsplit(request.path)
     query_token = parse_qs(parts.query).get("token", [""])[0]

@@ -16,7 +16,7 @@ from controllers.errors import ControllerError
 from controllers.state import Array
 from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
-from experiments.live.cap_hand import cap_there
+from experiments.live.cap_hand import open_cap_hand
 from experiments.live.driver import Driver
 from experiments.live.panels.clock_panel import ClockPanel
 from experiments.live.panels.gains_panel import GainsPanel
@@ -35,12 +35,12 @@ from sim.errors import SimError
 from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 
-FASTEST = 1.0 / 60.0  # [s] shortest time between two frames
-SHARE = 0.5  # share of a core that drawing may take; a slower machine draws fewer frames
+MIN_FRAME_INTERVAL = 1.0 / 60.0  # [s] shortest time between two frames
+MAX_CPU_FRACTION = 0.5  # share of a core that drawing may take; a slower machine draws fewer frames
 POLL = 0.2  # [s] between two updates of texts and plots
 LINES = 4  # number of most recent messages that are shown
 
@@ -74,7 +74,7 @@ class Page:
         self._add_panels(config, shadows)
         open_with(self.server, _first_view)
         self.server.on_client_disconnect(self._on_disconnect)
-        self._cap, message = cap_there()
+        self._cap, message = open_cap_hand()
         if message:
             self.say(message)
         self.desk.build(config)
@@ -178,7 +178,7 @@ class Page:
                     last_update = begin
                     self._update_panels()
             now = time.perf_counter()
-            due = max(due + FASTEST, begin + (now - begin) / SHARE)
+            due = max(due + MIN_FRAME_INTERVAL, begin + (now - begin) / MAX_CPU_FRACTION)
             self._closed.wait(max(due - now, 1e-3))
 
     def close(self) -> None:
@@ -244,7 +244,7 @@ class Page:
         nq = stage.configuration_size
         with self.server.atomic():
             stage.show(
-                Shown(
+                Moment(
                     float(now["t"][0]),
                     now["qpos"][:nq],
                     now["ghost"],

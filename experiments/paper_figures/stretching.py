@@ -24,7 +24,7 @@ def stretching(runs: Path) -> Figure:
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
         before = MILLIMETRES * recording.arrays["curve"]
-        start = performance_start(recording)
+        start = _performance_start(recording)
         end = float(recording.channel("ticks", "t")[-1])
         _, editing, pressed = ticks(recording, 0.0, start, "p", "switch")
         _, performing, force = ticks(recording, start, end, "p", "force")
@@ -54,7 +54,7 @@ def rendered_result(runs: Path) -> Figure:
     """Figure 7: the animation of the stretched curve, rendered: the figure beside the default animation."""
     folder = runs / STRETCH
     with Recording(recording_in(folder)) as recording:
-        start = performance_start(recording)
+        start = _performance_start(recording)
         film = Film(show="both", start=start, width=_WIDTH, height=_HEIGHT)
         frames = Frames(recording, folder, film, offscreen_backend())
         rows = np.linspace(0, len(frames) - 1, MOMENTS + 2).astype(int)[1:-1]

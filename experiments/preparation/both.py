@@ -9,10 +9,10 @@ import viser
 
 from controllers.state import Array
 from models.humanoid.skeleton import figure_model
-from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
-from sim.viewer.framing import followed
+from sim.viewer.framing import view_offsets
 from sim.viewer.shapes import body_shapes
 
 _REPLAY_FPS = 30.0  # [1/s]
@@ -27,7 +27,7 @@ def both_html(captured: Clip, prepared: Clip) -> str:
 
     A closed clip is repeated, an open one holds its last pose. Both are kept in view, and the floor moves under them.
     """
-    longest = max(captured.duration, prepared.duration, _MAX_DURATION if prepared.closes(CLOSES) else 0.0)
+    longest = max(captured.duration, prepared.duration, _MAX_DURATION if prepared.closes(CLOSURE_TOLERANCE) else 0.0)
     times = np.arange(int(min(longest, _MAX_DURATION) * _REPLAY_FPS) + 1) / _REPLAY_FPS
     model = figure_model()
     data = mujoco.MjData(model)
@@ -40,7 +40,9 @@ def both_html(captured: Clip, prepared: Clip) -> str:
         for name, clip, side, colour in (("captured", captured, 1.0, GHOST), ("prepared", prepared, -1.0, "")):
             poses = clip_motion(clip, times).poses
             aside = np.array([0.0, _SIDE_OFFSET * side, 0.0])
-            figures.append((Actor(scene, name, shapes, 1.0, colour), poses, followed(poses[:, :2], _REPLAY_FPS), aside))
+            figures.append(
+                (Actor(scene, name, shapes, 1.0, colour), poses, view_offsets(poses[:, :2], _REPLAY_FPS), aside)
+            )
             scene.add_label(f"/labels/{name}", name, position=aside + np.array([0.0, 0.0, 2.0]), anchor="bottom-center",
                             font_screen_scale=1.25)  # fmt: skip
         floor = scene.add_grid("/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=10.0)

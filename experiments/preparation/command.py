@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.followed import followed
@@ -46,7 +46,7 @@ def prepare_file(
     for name, value, kind in (
         ("loop", loop, str), ("mirror", mirror, bool), ("hints", hints, Hints | None), ("overwrite", overwrite, bool),
     ):  # fmt: skip
-        of_kind(name, value, kind)
+        check_kind(name, value, kind)
     source, target = given_path("source", source), given_path("target", target)
     report = None if report is None else given_path("report", report)
     check_target(target, overwrite)

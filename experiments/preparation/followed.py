@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.bounds import FLYING, RESIDUAL, beyond
+from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS, exceeding_text
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
 SECONDS = 20.0  # default duration of a trial
-ROOT_LOST = 1.0  # distance of the root from its reference that counts as a fall [m]
+MAX_ROOT_ERROR = 1.0  # distance of the root from its reference that counts as a fall [m]
 
 
 class Followed(NamedTuple):
@@ -23,7 +23,7 @@ class Followed(NamedTuple):
     residual : float
         RMS residual force while the reference stands, until the end of a clip that is not repeated [body weights].
     fell : float or None
-        Time at which it first fell, or its root was `ROOT_LOST` from its reference [s]; None if it did not fall.
+        Time at which it first fell, or its root was `MAX_ROOT_ERROR` from its reference [s]; None if it did not fall.
     seconds : float
         Duration of the trial [s].
     cost : float
@@ -37,8 +37,8 @@ class Followed(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not fall and its residual is at most `FLYING`."""
-        return self.fell is None and self.residual <= FLYING
+        """Whether it did not fall and its residual is at most `RESIDUAL_IN_FLIGHTS`."""
+        return self.fell is None and self.residual <= RESIDUAL_IN_FLIGHTS
 
     def __str__(self) -> str:
         """Residual in percent, with the time of a fall in brackets."""
@@ -53,11 +53,11 @@ class Followed(NamedTuple):
 
     def faults(self, leaps: bool) -> tuple[str, ...]:
         """Faults, a line each; `leaps` says whether the clip has flights, which raises the bound of the residual."""
-        bound = FLYING if leaps else RESIDUAL
+        bound = RESIDUAL_IN_FLIGHTS if leaps else MAX_RESIDUAL
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:
-            lacks = beyond(100 * self.residual, 100 * bound)
+            lacks = exceeding_text(100 * self.residual, 100 * bound)
             return (f"the physical figure lacks {lacks} % of weight; {100 * bound:.0f} at most",)
         return ()
 
@@ -71,5 +71,5 @@ def followed(
     cost = (process_time() - began) / seconds
     root_errors = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
     tracking = report(motion)
-    fall_times = [*motion.reference.times[root_errors > ROOT_LOST][:1].tolist(), *tracking.falls[:1]]
+    fall_times = [*motion.reference.times[root_errors > MAX_ROOT_ERROR][:1].tolist(), *tracking.falls[:1]]
     return Followed(tracking.stance.force_rms, min(fall_times, default=None), seconds, cost)

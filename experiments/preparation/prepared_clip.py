@@ -8,11 +8,11 @@ import numpy as np
 
 from controllers.state import Array
 from experiments.console.progress import working
-from experiments.files.array_cache import is_kept, kept_array
+from experiments.files.array_cache import cached_array, is_cached
 from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
-from sim.compilation.side_by_side import side_by_side
-from sim.compilation.sources import kept_folder
+from sim.compilation.side_by_side import run_in_workers
+from sim.compilation.sources import results_folder
 
 # A change of this module, or of any that it imports, invalidates the cache.
 _PREPARING_MODULE = "models.mocap.preparation.prepare"
@@ -50,7 +50,7 @@ def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedCli
     missing = {} if raw else {capture.path: capture for capture in captures if capture.foreign and not capture.is_kept}
     if len(missing) > 1:
         with working(f"preparing {len(missing)} captures", sum(one.loaded.clip.duration for one in missing.values())):
-            side_by_side([(prepared_clips, ([path],)) for path in missing])
+            run_in_workers([(prepared_clips, ([path],)) for path in missing])
     return [capture.prepared(raw) for capture in captures]
 
 
@@ -66,7 +66,7 @@ class _Capture(NamedTuple):
 
     @property
     def is_kept(self) -> bool:
-        return is_kept(kept_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape)
+        return is_cached(results_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape)
 
     @property
     def _cache_key(self) -> tuple[Array, Array]:
@@ -82,7 +82,7 @@ class _Capture(NamedTuple):
         notes = () if report is None else tuple(f"{self.path.name}: {note}" for note in report.notes())
         if raw or report is None:
             return PreparedClip(clip, notes)
-        rows = kept_array(kept_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape, self._prepare)
+        rows = cached_array(results_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape, self._prepare)
         outcome = (
             "prepared"
             if rows[0, 1]

@@ -8,8 +8,8 @@ from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.followed import Followed
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import FLYING, beyond
-from models.mocap.preparation.laps import likeness
+from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text
+from models.mocap.preparation.laps import frame_distances
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
 
@@ -139,7 +139,7 @@ def gaps(made: Prepared) -> tuple[str, str]:
     part, last = made.looped, made.clip.n_frames - 1
     if part.kind == "open":
         return "no loop", "no loop: at rest at both ends"
-    gap = float(likeness(made.clip, np.array([0, last]))[0][0, 1])
+    gap = float(frame_distances(made.clip, np.array([0, last]))[0][0, 1])
     mirror = " in a mirror" if part.kind == "half stride" else ""
     was = f"ends {np.rad2deg(part.gap):.1f}° apart{mirror}" if np.isfinite(part.gap) else "as stated"
     return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
@@ -152,8 +152,9 @@ def advice(made: Prepared) -> tuple[str, ...]:
         return ()
     excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
     lacks = f"{100 * change.residual:.0f} % of weight"
-    if change.residual > FLYING:
-        lacks = f"{beyond(100 * change.residual, 100 * FLYING)} % of weight, more than {100 * FLYING:.0f}"
+    if change.residual > RESIDUAL_IN_FLIGHTS:
+        bound = 100 * RESIDUAL_IN_FLIGHTS
+        lacks = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
     return (
         f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
         f"lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "

@@ -28,7 +28,7 @@ Show = Literal["both", "workspace", "stage"]
 
 WORKSPACE_SHARE = 0.42  # of the width, if both are shown
 LEAST_WIDTH, LEAST_HEIGHT = 160, 120  # smallest frame on which text is legible [pixels]
-MOST_SIZE = 8192  # of either side [pixels]: the widest frame of H.264's levels
+MAX_SIZE = 8192  # of either side [pixels]: the widest frame of H.264's levels
 _SHIRT_COLOR = "#3d6ba1"  # colour of the figure's shirt in its model
 _FIGURE_LABELS = {"physical": "physical figure", "kinematic": "edited animation h(p)", "robot": "robot arm"}
 _GHOST_LABELS = {"default": "default animation h(φ)", "animation": "edited animation h(p)"}
@@ -66,11 +66,11 @@ class Film:
     fps: float = 30.0
 
     def __post_init__(self) -> None:
-        small, large = self.width < LEAST_WIDTH or self.height < LEAST_HEIGHT, max(self.width, self.height) > MOST_SIZE
+        small, large = self.width < LEAST_WIDTH or self.height < LEAST_HEIGHT, max(self.width, self.height) > MAX_SIZE
         if small or large or self.width % 2 or self.height % 2:
             raise SimError(
                 f"--width and --height are {self.width} and {self.height}; expected even numbers of pixels, "
-                f"{LEAST_WIDTH} x {LEAST_HEIGHT} or more, {MOST_SIZE} at most"
+                f"{LEAST_WIDTH} x {LEAST_HEIGHT} or more, {MAX_SIZE} at most"
             )
         if not 1.0 <= self.fps <= 240.0:
             raise SimError(f"--fps is {self.fps:g}; expected 1 to 240 frames per second")
@@ -154,7 +154,7 @@ def _stage_legend(world: ShownWorld, ghost: Ghost) -> tuple[Entry, ...]:
 
 
 @dataclass(frozen=True)
-class Filmed:
+class FilmResult:
     """Result of rendering a film.
 
     Attributes
@@ -179,7 +179,7 @@ class Filmed:
         ]
 
 
-def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite: bool = False) -> Filmed:
+def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite: bool = False) -> FilmResult:
     """Write the film of a run.
 
     Parameters
@@ -221,7 +221,7 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
         console.print(f"The run was cut short: the film shows the {frames.moments.t[-1]:.1f} s that are recorded.")
     console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
     clearance = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
-    return Filmed(tuple(map(str, targets)), len(frames), clearance)
+    return FilmResult(tuple(map(str, targets)), len(frames), clearance)
 
 
 def _with_progress(rows: range, console: Console) -> Iterator[int]:

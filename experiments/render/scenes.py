@@ -27,14 +27,14 @@ CAMERAS: dict[Camera, tuple[float, float]] = {
     "back": (0.0, -9.0),
     "above": (205.0, -50.0),
 }
-APART = 0.95  # distance of the ghost from the figure, to the side [m]
-BEHIND = 0.35  # and away from the camera [m]
+GHOST_SPACING = 0.95  # distance of the ghost from the figure, to the side [m]
+GHOST_DEPTH = 0.35  # and away from the camera [m]
 FRAME_SCALE = 1.1  # size of the picture relative to its required contents
 ARM_REACH = 0.45  # smallest visible distance to either side of a root [m]
 LEGEND = 0.1  # room for the legend at the bottom [m]
 ARROW = 0.06  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.6  # [s] of the stylus's path that are drawn behind it
-HIDDEN = 0.004  # shortest arrow that is drawn [m]
+MIN_ARROW_LENGTH = 0.004  # shortest arrow that is drawn [m]
 
 _ARROW, _ROD = mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE
 
@@ -86,7 +86,7 @@ class Workspace:
         tip = self._p_WH + self._p[tick]
         for (name, color), width_m in zip((("force", FIELD), ("user", USER)), (0.0042, 0.0034), strict=True):
             arrow = self.metres_per_newton * self._forces[name][tick]
-            if np.linalg.norm(arrow) > HIDDEN:
+            if np.linalg.norm(arrow) > MIN_ARROW_LENGTH:
                 canvas.connect(_ARROW, tip, tip + arrow, width_m, mixed_with_white(color, 0.0))
         return canvas.picture(width, height)
 
@@ -143,7 +143,7 @@ class Stage:
     def _to_ghost(self, row: int) -> Array:
         """Vector from the figure to its ghost over the floor: right in the view, and away from the viewer [m]."""
         a = np.deg2rad(self._view_azimuth(row))
-        return APART * np.array([np.sin(a), -np.cos(a)]) + BEHIND * np.array([np.cos(a), np.sin(a)])
+        return GHOST_SPACING * np.array([np.sin(a), -np.cos(a)]) + GHOST_DEPTH * np.array([np.cos(a), np.sin(a)])
 
     def _frame_camera(self, aspect: float) -> tuple[float, float]:
         """Distance of the camera and height of its target [m], such that everything that moves is in the picture."""

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
-from experiments.results.folder import of_device, scene_of
+from experiments.results.folder import is_device_recording, scene_of
 from models.humanoid.skeleton import N_POSE, figure_spec
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
 from sim.errors import SimError
@@ -97,7 +97,7 @@ def shown_world(recording: Recording, width: int, height: int, bent: Array | Non
     SimError
         If the recording is of a device, or lacks a channel that is drawn.
     """
-    if of_device(recording):
+    if is_device_recording(recording):
         raise SimError(f"{recording.path}: is of a device, without the figure; expected the recording of a simulation")
     kind = recording.texts["figure"]
     scene = SceneConfig() if kind == "robot" else scene_of(recording)

@@ -13,7 +13,7 @@ from models.mocap.library import load_clip
 from models.mocap.motion.quaternions import heading
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.viewer.framing import followed
+from sim.viewer.framing import view_offsets
 
 Ghost = Literal["default", "animation", "none"]
 """Animation that the ghost shows: that of the unedited curve, that of the hand's path, or none."""
@@ -87,7 +87,7 @@ def timeline(
         return Timeline(t, ticks, frames, None, "none", np.zeros((len(t), 2)), np.zeros(len(t)))
     qpos, at = recording.channel("frames", "qpos"), world.figure_at
     roots = np.array([qpos[int(k)][at : at + 7] for k in frames])
-    path = followed(roots[:, :2], fps)
+    path = view_offsets(roots[:, :2], fps)
     middle = np.zeros(2) if np.any(path) else np.median(roots[:, :2], axis=0)
     heading = _averaged_heading(roots[:, 3:7], fps)
     return Timeline(t, ticks, frames, *_ghost_poses(recording, folder, frames, ghost), path + middle, heading)

@@ -29,7 +29,7 @@ _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, D
 def check_folder(out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be written, is in use, or holds a run that may not be replaced."""
     if out.exists():
-        with claimed(out):
+        with locked_folder(out):
             pass
     check_holds(out, overwrite)
 
@@ -45,7 +45,7 @@ def check_holds(out: Path, overwrite: bool) -> None:
 
 
 @contextmanager
-def claimed(out: Path) -> Generator[None]:
+def locked_folder(out: Path) -> Generator[None]:
     """Lock a folder, created if it is missing, for this process; the system releases the lock when the process ends.
 
     Raises
@@ -72,8 +72,8 @@ def claimed(out: Path) -> Generator[None]:
 
 @contextmanager
 def claimed_and_cleared(out: Path, overwrite: bool) -> Generator[None]:
-    """Lock a folder as `claimed` does, and clear it for a run; raises SimError if it is not to be written into."""
-    with claimed(out):
+    """Lock a folder as `locked_folder` does, and clear it for a run; raises SimError if it must not be written into."""
+    with locked_folder(out):
         check_holds(out, overwrite)
         clear_folder(out)
         yield
@@ -107,12 +107,12 @@ def config_of(recording: Recording) -> RunConfig:
         raise SimError(f"{error}; it was recorded by another version of the program, which can run it again") from None
 
 
-def of_device(recording: Recording) -> bool:
+def is_device_recording(recording: Recording) -> bool:
     """Whether a recording is of a device, whose figure is only shown beside it and not recorded."""
     return "clock" in recording.groups.get("ticks", {})
 
 
-def animated(recording: Recording) -> bool:
+def has_animation(recording: Recording) -> bool:
     """Whether a recording holds the animation of a figure: a run without one has none, nor has a robot arm's."""
     return "reference" in recording.groups.get("frames", {}) and recording.texts.get("figure") != "robot"
 

@@ -5,11 +5,11 @@ from pathlib import Path
 from rich.console import Console
 
 from experiments.console.compiling import compiler
-from experiments.results.folder import RECORDING, SUMMARY, claimed, clips_of, config_of
+from experiments.results.folder import RECORDING, SUMMARY, clips_of, config_of, locked_folder
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.results.pages.report_of import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
-from experiments.runs.run import measured, write_animations, write_summary
+from experiments.runs.run import session_summary, write_animations, write_summary
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
 from sim.loop.memory import peak_memory_mb
@@ -29,7 +29,7 @@ def finish(folder: Path) -> list[str]:
     with Recording(folder / RECORDING) as recording:
         is_configured = "mode" in recording.config and "live" not in recording.texts
         interrupted = not recording.complete and not (folder / SUMMARY).exists()
-    with claimed(folder):
+    with locked_folder(folder):
         if interrupted and is_configured:
             _complete(folder)
         write_report_of(folder)
@@ -47,5 +47,5 @@ def _complete(folder: Path) -> None:
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
         times = loop.run(seconds)
     speed = SpeedSummary(times.real_time_factor, float("nan"), peak_memory_mb())
-    write_summary(folder, measured(folder, session, speed))
+    write_summary(folder, session_summary(folder, session, speed))
     write_animations(folder, session)

@@ -8,11 +8,11 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted as LiftedMap
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.maps import MapFile
 from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
@@ -25,7 +25,7 @@ from experiments.setups.maps.of_stature import for_size_of
 from experiments.setups.maps.place import Place
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
-from experiments.setups.parts.pace import reached
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
@@ -52,9 +52,9 @@ class _AboutCurve:
     reach: float = 0.025
     expressive: bool = False
 
-    @in_keywords()
+    @with_keyword_messages()
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if not 0.0 < self.reach < np.inf:
             raise ParameterError(f"reach is {self.reach:g}; expected more than 0 m, and finite")
         check_clips(self.clips, self.most, type(self).__name__.lower())
@@ -64,7 +64,7 @@ class _AboutCurve:
         return short_text(self)
 
     def _place(self) -> Place:
-        curve = reached(self.around)
+        curve = check_reach(self.around)
         points = curve.point(np.linspace(curve.start, curve.end, 65))
         return Place(curve, float(np.hypot(points[:, 0], points[:, 1]).mean()), self.reach, self.expressive)
 
@@ -148,9 +148,9 @@ class Lifted:
     curve: str = ""
     expressive: bool = False
 
-    @in_keywords()
+    @with_keyword_messages()
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         given_path("file", self.file)
         _ = self.around
 
@@ -208,13 +208,13 @@ class RobotArm:
     reach: float = 0.025
     scale: float = 1.5
 
-    @in_keywords()
+    @with_keyword_messages()
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         for name, unit in (("reach", " m"), ("scale", "")):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ParameterError(f"{name} is {getattr(self, name):g}; expected more than 0{unit}, and finite")
-        reached(self.around)
+        check_reach(self.around)
 
     def __repr__(self) -> str:
         return short_text(self)

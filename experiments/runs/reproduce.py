@@ -12,7 +12,7 @@ from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
-from experiments.results.folder import RECORDING, clips_of, config_of, of_device
+from experiments.results.folder import RECORDING, clips_of, config_of, is_device_recording
 from experiments.setups.parts.devices import check_hand
 from experiments.setups.wiring import wire
 from sim.errors import SimError
@@ -110,7 +110,7 @@ def reproduce(folder: Path) -> Reproduced:
     with Recording(folder / RECORDING) as recording:
         if "live" in recording.texts:
             raise SimError(f"{folder}: was {recording.texts['live']}; expected the run of a configuration")
-        if of_device(recording):
+        if is_device_recording(recording):
             raise SimError(f"{folder}: is of a device, which moves differently each time; expected a simulated run")
         remarks = _environment_remarks(recording.versions)
         config = config_of(recording)

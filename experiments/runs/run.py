@@ -14,8 +14,8 @@ from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
-from experiments.console.estimates import SIMULATING, check_length, foreseen
-from experiments.console.progress import keep_seconds, simulating
+from experiments.console.estimates import SIMULATING, check_length, cost_estimate
+from experiments.console.progress import simulating, store_duration
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
 from experiments.results.folder import (
@@ -46,7 +46,7 @@ from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
 from sim.viewer.page import NullPage, Page
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 
 BVH_FPS = 50.0  # [1/s]
 VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
@@ -80,7 +80,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     for remark in session.remarks:
         console.print(remark, highlight=False)
     full_config = cast(RunConfig, session.config)
-    cost_message = foreseen(out, full_config.seconds, groups(session.servo))
+    cost_message = cost_estimate(out, full_config.seconds, groups(session.servo))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
     with claimed_and_cleared(out, overwrite):
@@ -129,7 +129,7 @@ def record(
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
         session.haptic_map.check()  # before the measures evaluate it again, outside a tick
-        summary = measured(out, session, speed)
+        summary = session_summary(out, session, speed)
         recorder.close(asdict(summary) | {"lines": summary.lines()})
     return summary
 
@@ -146,7 +146,7 @@ def _simulate(
         record(ticks, frames, n)
         hand = ticks.hand[n - 1]
         page.show(
-            Shown(
+            Moment(
                 hand[HAND_TIME], shown_configuration(servo), servo.reference.pose if simulated else hand[:0],
                 hand[POSITION], ticks.force[n - 1], ticks.user[n - 1], np.full(3, np.nan),
             )
@@ -172,7 +172,7 @@ def _simulate(
         with session.naming_laws():
             times = loop.run(rest, progress)
     page.close()
-    keep_seconds(SIMULATING, 1.0 / times.real_time_factor)
+    store_duration(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
 
 
@@ -184,7 +184,7 @@ def _live_page(session: Session) -> Page:
     return LivePage(session.world.full_model(), courses(static), radius, session.world.kind)
 
 
-def measured(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
+def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSummary:
     """Summary of a session that has been run, computed from its recording."""
     parts = session.parts
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from rich.console import Console
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from controllers.state import Array
-from experiments.config.keywords import in_keywords, keywords
+from experiments.config.keywords import to_keywords, with_keyword_messages
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.files.given_path import given_path
@@ -32,7 +32,7 @@ def check_record(record: str | Path | None, overwrite: bool) -> None:
     """Refuse arguments of `Run.of` that have a wrong type, before anything is compiled."""
     if record is not None:
         given_path("record", record)
-    of_kind("overwrite", overwrite, bool)
+    check_kind("overwrite", overwrite, bool)
 
 
 class NoChannel(SimError, KeyError):
@@ -115,7 +115,7 @@ class Run:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Remarks before the run."""
-        return tuple(map(keywords, self._session.remarks))
+        return tuple(map(to_keywords, self._session.remarks))
 
     @property
     def ticks(self) -> Channels:
@@ -127,7 +127,7 @@ class Run:
         """Channels at the rate of the figure's control."""
         return Channels(self, "frames")
 
-    @in_keywords(overwrite="overwrite=True")
+    @with_keyword_messages(overwrite="overwrite=True")
     def to_bvh(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write the animation as the hand made it.
 
@@ -139,7 +139,7 @@ class Run:
             If the run has no figure.
         """
         target = given_path("path", path)
-        of_kind("overwrite", overwrite, bool)
+        check_kind("overwrite", overwrite, bool)
         if not self._session.world.has_figure:
             raise SimError("the run has no figure, and so no animation; expected a run of a figure")
         check_target(target, overwrite)

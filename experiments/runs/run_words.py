@@ -7,10 +7,10 @@ from typing import Any, cast
 from rich.console import Console
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, load_config
-from experiments.config.words import changed, run_config
+from experiments.config.words import run_config, with_options
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
 from experiments.files.given_path import given_path
@@ -18,7 +18,7 @@ from experiments.runs.run_result import Run, check_record
 from experiments.setups.wiring import wire
 
 
-@in_keywords(out="record")
+@with_keyword_messages(out="record")
 def run(
     config: str | Path | None = None, *, record: str | Path | None = None, overwrite: bool = False, **words: Any
 ) -> Run:
@@ -54,7 +54,7 @@ def run(
     given: dict[str, Any] = {
         name: tuple(cast(list[object], value)) if isinstance(value, list) else value for name, value in words.items()
     }
-    run_settings = run_config(**given) if file is None else changed(load_config(file), given)
+    run_settings = run_config(**given) if file is None else with_options(load_config(file), given)
     check_length(Path(record or tempfile.gettempdir()), run_settings.seconds, run_settings.clock.servo_period)
     console = Console(stderr=True)
     session = wire(run_settings, ready=compiler(console))

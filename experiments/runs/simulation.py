@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 
-from controllers.checks import check_kinds, of_kind
+from controllers.checks import check_field_types, check_kind
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law
@@ -18,9 +18,9 @@ from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array, HandState, Wrench, stylus_path
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_dict
-from experiments.config.run_config import SIMULATED_TOO, Clock, Figure, Phantom, Replay, check_seed
+from experiments.config.run_config import REPLAY_WITH_USER, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
@@ -28,15 +28,15 @@ from experiments.runs.map_objects import BodyMap, RobotArm
 from experiments.runs.run_result import Run, check_record
 from experiments.runs.short_text import short_text
 from experiments.setups.maps.own_map import own_parts
-from experiments.setups.parts.budget import SPAN, fastest, tank_for
+from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.devices import device_of
-from experiments.setups.parts.hands import TRACED, intent_of, participant
-from experiments.setups.parts.pace import reached
+from experiments.setups.parts.hands import TRACE_SAMPLE_TIME, intent_of, participant
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
-from experiments.setups.wiring import assemble, check_rates, check_seconds
+from experiments.setups.wiring import check_rates, check_seconds, wire_parts
 from models.world.scene import SceneConfig
-from sim.devices.device import ticks_of
+from sim.devices.device import available_ticks
 from sim.loop.loop import Loop
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.hand.arm import Arm
@@ -71,9 +71,9 @@ class User:
     person: Person | None = None
     intent: PersonIntent | None = None
 
-    @in_keywords()
+    @with_keyword_messages()
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
 
     def __repr__(self) -> str:
         return short_text(self)
@@ -95,7 +95,7 @@ class User:
             If the Phantom does not reach what the hand traces.
         """
         if self.traces is not None:
-            reached(self.traces)
+            check_reach(self.traces)
         if self.intent is not None and self.person is None:
             raise ParameterError(f"the intent {type(self.intent).__name__} is a person's; give hvf.User(person=…) too")
         if self.person is not None:
@@ -109,8 +109,8 @@ class User:
             return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
         if self.traces is None:
             return Arm(pushes=self.pushes, grabs=self.grabs, turns=self.turns)
-        path = self.traces.point(np.arange(0.0, seconds + 2.0 * TRACED, TRACED))
-        return Arm(path=path, period=TRACED, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
+        path = self.traces.point(np.arange(0.0, seconds + 2.0 * TRACE_SAMPLE_TIME, TRACE_SAMPLE_TIME))
+        return Arm(path=path, period=TRACE_SAMPLE_TIME, pushes=self.pushes, grabs=self.grabs, turns=self.turns)
 
 
 class Tick(NamedTuple):
@@ -176,14 +176,14 @@ class Simulation:
     seed: int = 1
     tank: EnergyTank | None = None
 
-    @in_keywords()
+    @with_keyword_messages()
     def __post_init__(self) -> None:
         _check_kinds(self)
         self.figure.check(leads=False, body=self.body)
         check_seed(self.device, self.seed)
         check_rates(self)
         if isinstance(self.device, Replay) and self.user.acts:
-            raise ParameterError(SIMULATED_TOO)
+            raise ParameterError(REPLAY_WITH_USER)
         period = self.clock.servo_period
         if self.tank is not None and not np.isclose(self.tank.period, period, rtol=1e-9, atol=0.0):
             raise ParameterError(
@@ -205,7 +205,7 @@ class Simulation:
         figure, clock = self.figure, self.clock
         return SceneConfig(figure.stature, figure.mass, clock.servo_period, clock.physics_step)
 
-    @in_keywords()
+    @with_keyword_messages()
     def session(self, seconds: float | None = None) -> Session:
         """The simulation put together for at most `seconds` [s]; compiles what it needs.
 
@@ -216,14 +216,14 @@ class Simulation:
         ModelError, ControllerError, SimError
             If its parts do not fit together.
         """
-        of_kind("seconds", seconds, float | None)
+        check_kind("seconds", seconds, float | None)
         if seconds is not None and not 0.0 < seconds < np.inf:
             raise ParameterError(f"seconds is {seconds:g}; expected more than 0 s, and finite")
         world, console = World(self.scene, self.body), Console(stderr=True)
         device, span = device_of(self, world, seconds), seconds or _DEFAULT_DURATION
         given = self.haptic_map
         maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world)
-        return assemble(world, maps, lambda m: self._parts(m, span), compiler(console), device)
+        return wire_parts(world, maps, lambda m: self._parts(m, span), compiler(console), device)
 
     def _curve(self) -> Trajectory:
         """Curve of the first law of the field that has one: a user-defined map lies along it."""
@@ -234,7 +234,7 @@ class Simulation:
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
-        power, spring = limiter.peak * fastest(maps.curve), (np.inf, SPAN)
+        power, spring = limiter.peak * fastest(maps.curve), (np.inf, WORKSPACE_WIDTH)
         tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(
@@ -245,7 +245,7 @@ class Simulation:
             handled=((0.0, np.inf),) if self.user.traces is not None else handled,
         )  # fmt: skip
 
-    @in_keywords(out="record")
+    @with_keyword_messages(out="record")
     def run(self, seconds: float, record: str | Path | None = None, overwrite: bool = False) -> Run:
         """Run from the start and return the result.
 
@@ -263,7 +263,7 @@ class Simulation:
         ModelError, ControllerError, SimError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
-        of_kind("seconds", seconds, float)
+        check_kind("seconds", seconds, float)
         check_record(record, overwrite)
         check_seconds(self, seconds)
         check_length(Path(record or tempfile.gettempdir()), seconds, self.clock.servo_period)
@@ -273,7 +273,7 @@ class Simulation:
         """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
         loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
-        left = ticks_of(session.servo.device)
+        left = available_ticks(session.servo.device)
         for _ in itertools.count() if left is None else range(left):
             with session.naming_laws():
                 ticks, frames = loop.step()

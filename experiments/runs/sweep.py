@@ -7,12 +7,12 @@ from dataclasses import fields, is_dataclass
 from dataclasses import replace as replaced
 from typing import Any, NamedTuple, cast
 
-from controllers.checks import checked, of_kind
+from controllers.checks import check_kind, checked
 from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import OP_CODE, OP_PARAMETERS, Join
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.function_law import FunctionLaw
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.runs.run_result import Run
 from experiments.runs.short_text import name_of
 from experiments.runs.simulation import Simulation
@@ -37,7 +37,7 @@ class Swept(NamedTuple):
     run: Run
 
 
-@in_keywords()
+@with_keyword_messages()
 def sweep(
     sim: Simulation, values: Mapping[str, Sequence[Any]], seconds: float = 10.0, threads: int = 1
 ) -> Iterator[Swept]:
@@ -63,15 +63,15 @@ def sweep(
         Before the first run, if there is no such parameter, or several laws have it; it has no values, or one that it
         cannot have; there is no thread; or an argument is of another kind.
     """
-    of_kind("sim", sim, Simulation)
-    of_kind("values", values, Mapping)
+    check_kind("sim", sim, Simulation)
+    check_kind("values", values, Mapping)
     for path, several in values.items():
-        of_kind("a path of values", path, str)
-        of_kind(path, several, Sequence[Any])
+        check_kind("a path of values", path, str)
+        check_kind(path, several, Sequence[Any])
         if len(several) == 0:
             raise ParameterError(f"{path} has no values; expected one or more")
-    of_kind("seconds", seconds, float)
-    of_kind("threads", threads, int)
+    check_kind("seconds", seconds, float)
+    check_kind("threads", threads, int)
     if threads < 1:
         raise ParameterError(f"threads is {threads}; expected 1 or more")
     combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]

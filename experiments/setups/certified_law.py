@@ -61,12 +61,12 @@ def governor_drag(config: RunConfig) -> float:
     return 0.0 if governor is None or isinstance(config.mode, Rivers) else governor.governor_drag
 
 
-def of_clips(config: RunConfig) -> bool:
+def depends_on_clips(config: RunConfig) -> bool:
     """Whether the certificate depends on clips too: a led figure, a map from a file, a governor, gates or walls."""
-    return isinstance(config.map, Led | MapFile) or governor_drag(config) > 0.0 or bool(left_out(config))
+    return isinstance(config.map, Led | MapFile) or governor_drag(config) > 0.0 or bool(uncertified_parts(config))
 
 
-def left_out(config: RunConfig) -> tuple[str, ...]:
+def uncertified_parts(config: RunConfig) -> tuple[str, ...]:
     """Names of the parts of a run that act besides its certified laws, and that no certificate covers."""
     mode = config.mode
     names: list[str] = []

@@ -11,14 +11,14 @@ from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import STYLUS_POSE, UPRIGHT
 from controllers.walking.walker import walker_at
-from experiments.config.run_config import NOBODY_LED, RunConfig, phantom_of
+from experiments.config.run_config import LEAD_WITHOUT_FIGURE, RunConfig, phantom_of
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.bodies import body_of, figure_period
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.devices import DeviceOf, device_of
 from experiments.setups.parts.eyes import POSES, with_eyes
 from experiments.setups.parts.hands import Beginning, beginning
-from experiments.setups.parts.pace import reached
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
@@ -27,7 +27,7 @@ from models.mocap.motion.clip import Clip
 from models.one_blas_thread import on_one_blas_thread
 from models.phantom.kinematics import Quat
 from sim.compilation.units import Unit
-from sim.devices.device import known_start, measure_in_motion
+from sim.devices.device import first_reading, measure_in_motion
 from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
@@ -78,14 +78,14 @@ def wire(
     check_rates(config)
     world = World(config.scene, config.body)
     if device is None and config.leads and not world.has_figure:
-        raise ParameterError(NOBODY_LED)  # with a real device, the walker is led even without a figure
+        raise ParameterError(LEAD_WITHOUT_FIGURE)  # with a real device, the walker is led even without a figure
     if device is None:
         device = device_of(config, world, config.seconds)
     maps = maps_of(config, world.body, clips)
-    return assemble(world, maps, lambda maps: parts_of(config, maps), ready, device)
+    return wire_parts(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
 
-def assemble(
+def wire_parts(
     world: World,
     maps: MapParts[Any],
     parts_of: Callable[[Any], Parts],
@@ -114,7 +114,7 @@ def assemble(
     """
     draft = parts_of(maps)
     for curve in draft.program.curves:
-        reached(curve)
+        check_reach(curve)
     ready(_required_units(draft, _make_servo(draft, world, device)))
     # The map is refined, which takes compiled code, only after all checks have passed and if anything follows it.
     refined = maps if world.kind == "none" else maps.refine(world.kind == "physical")
@@ -208,7 +208,7 @@ def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
 
 def _start_state(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
     """Start state of the stylus, and its orientation; if that is None, the gimbal's joints are at zero."""
-    hand = known_start(servo.device)
+    hand = first_reading(servo.device)
     if hand is not None:
         w, x, y, z = (float(number) for number in hand.q)
         return Beginning(hand.p, hand.v, np.zeros(3)), (w, x, y, z)

@@ -16,7 +16,7 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import EVERYTHING, LAP, Conditions, Trial, draw_trial, hand_path
+from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
 
@@ -60,7 +60,7 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         k_r = float(rng.uniform(0.05, 0.9)) * predicted(trial)
         hand = trial.hand
         hands = HandRange(*(_interval_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
-        lap = LAP_SECONDS / LAP * np.asarray(trial.curve.times)
+        lap = LAP_SECONDS / LAP_DURATION * np.asarray(trial.curve.times)
         curve = Trajectory(lap, trial.curve.positions, periodic=True)
         river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
         try:
@@ -80,7 +80,7 @@ def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) 
     """Simulate a hand inside the intervals from a random state at a random phase."""
     river, device, clock = drawn.river, drawn.river.device, drawn.river.sampling
     hand = HandImpedance(*(float(rng.uniform(*getattr(drawn.hands, n))) for n in ("mass", "damping", "stiffness")))
-    phase = float(rng.uniform(0.0, LAP))
+    phase = float(rng.uniform(0.0, LAP_DURATION))
     trial = Trial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
     loop = trial.loop()
     while True:
@@ -125,7 +125,7 @@ def certified_trials(
     for number in range(rivers):
         drawn = draw_certified(rng)
         clocks.append(drawn.river.sampling.period)
-        for releases, conditions in zip(found.values(), (ASSUMED, EVERYTHING), strict=True):
+        for releases, conditions in zip(found.values(), (ASSUMED, FULL_CONDITIONS), strict=True):
             releases += [release(drawn, conditions, rng) for _ in range(hands)]
         print(
             f"{number + 1}/{rivers}: {sum(r.diverges for releases in found.values() for r in releases)}",

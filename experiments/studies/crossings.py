@@ -24,7 +24,15 @@ from controllers.state import HAND_POSITION, HAND_QUATERNION, Array
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
-from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, LOOK, SIGMA, default_choice, law_of, river_time
+from experiments.setups.modes.rivers import (
+    ADMISSION,
+    HYSTERESIS,
+    SELECTION_TIME_CONSTANT,
+    SIGMA,
+    default_choice,
+    law_of,
+    river_time,
+)
 from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
 from models.phantom.spec import MOTOR_JOINTS
@@ -129,7 +137,9 @@ def crossing_field(second: River, form: Form, alone: bool) -> Program:
         for river in (straight_river(0.0), second)
     )
     bundle = RiverBundle(rivers[:1] if alone else rivers, ("1",) if alone else ("1", "2"))
-    return HigherOrder(bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form, LOOK).program()
+    return HigherOrder(
+        bundle, ADMISSION * SPEED, SIGMA[form] * SPEED, HYSTERESIS * SPEED, form, SELECTION_TIME_CONSTANT
+    ).program()
 
 
 def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:

@@ -25,7 +25,7 @@ from controllers.walking.gait import Gait
 from controllers.walking.walked_path import STEP
 from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import LAP, Conditions, Trial
+from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.hand.arm import Arm
@@ -91,9 +91,9 @@ def leading_trial(
 ) -> LeadingTrial:
     """A trial at a share `phase` of the default S, slowed down until it stands still; the hand has no stiffness."""
     curve = s_curve()
-    slow = LAP / curve.duration
+    slow = LAP_DURATION / curve.duration
     still = Trajectory(slow * np.asarray(curve.times), curve.positions, ends=curve.ends)
-    return LeadingTrial(still, phase * LAP, b, sampling, hand, np.array([0.4, 0.5, 0.77]), regime)
+    return LeadingTrial(still, phase * LAP_DURATION, b, sampling, hand, np.array([0.4, 0.5, 0.77]), regime)
 
 
 TRIALS: Mapping[str, LeadingTrial] = {

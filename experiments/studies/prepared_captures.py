@@ -15,7 +15,7 @@ from experiments.preparation.source_deviation import deviations
 from experiments.studies.random_sets import JUDGING, TUNING
 from models.errors import ModelError
 from models.mocap.library import embedded
-from models.mocap.preparation.bounds import FLYING
+from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
@@ -35,7 +35,7 @@ def row(path: Path, made: Prepared) -> str:
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
     most, directions, places = kept.extremes[0], *_source_deviations(path, made)
-    why = "" if after.stands else "motion" if not made.near or change.residual > FLYING / 2 else "figure"
+    why = "" if after.stands else "motion" if not made.near or change.residual > RESIDUAL_IN_FLIGHTS / 2 else "figure"
     cells = (
         _file_name(path),
         _half_name(path),

@@ -24,7 +24,7 @@ from controllers.motion.strides import natural_lap
 from controllers.state import Array
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import grounded, led_by, not_blendable, off_pace
+from experiments.fitting.blendable import not_blendable, off_pace, timing_clip, with_loop_first
 from experiments.fitting.similarity import motion_of
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.followed import followed
@@ -34,7 +34,7 @@ from experiments.trials.trial.trial_log import TrialLog
 from models.errors import ModelError
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import LIMIT
+from models.mocap.preparation.bounds import MAX_LIMIT_EXCESS
 from sim.body.falls import UP
 from sim.loop.loop import Loop
 
@@ -52,7 +52,7 @@ JUDGING = (
 """The two halves of the captures of `docs/validation/prepared-captures.md`, without one that is a copy."""
 
 SECONDS = 20.0  # [s] of a run
-MOST_ALONE = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
+MAX_SOLO_RESIDUAL = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
 LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
 _STRIDE = 5  # every fifth frame of the animation is measured: 100 a second
 
@@ -85,7 +85,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
         return Captured(name, f"refused: {error}", np.inf, None), None
     residual, fell, *_ = followed(clip)
     reason = "; ".join(not_blendable((clip, _rest_clip(clip))))
-    if not reason and (fell is not None or residual > MOST_ALONE):
+    if not reason and (fell is not None or residual > MAX_SOLO_RESIDUAL):
         reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
     return Captured(name, reason, residual, fell), clip
 
@@ -107,7 +107,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     """
     began = time.process_time()
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
-    timing = 0 if kind == "composite" else grounded(clips)
+    timing = 0 if kind == "composite" else timing_clip(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
     with TemporaryDirectory() as made:
@@ -116,7 +116,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
-            lap = natural_lap(led_by(timing, loops))
+            lap = natural_lap(with_loop_first(timing, loops))
             if kind == "rivers":
                 lap /= np.ceil(lap / LONGEST_LAP)
             words = dict[str, Any](map=kind, clips=names, lap=lap)
@@ -149,7 +149,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
     """Lowest sole [cm], foot skate in a stance (95 %, largest) [cm], and joints beyond limits [°] of the animation."""
     motion = motion_of(poses, fps)
-    excess = float(beyond_ranges(poses).max()) - LIMIT
+    excess = float(beyond_ranges(poses).max()) - MAX_LIMIT_EXCESS
     return {
         "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,
         "beyond": float(np.rad2deg(max(excess, 0.0))),

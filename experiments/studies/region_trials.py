@@ -21,7 +21,7 @@ from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from experiments.certify.certify import certified_rivers
-from experiments.certify.trial_simulation import EVERYTHING, Trial, hand_path
+from experiments.certify.trial_simulation import FULL_CONDITIONS, Trial, hand_path
 from experiments.config.run_config import RunConfig
 
 HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
@@ -81,7 +81,7 @@ def simulate_from(
     off = theta - np.array(device.angles(curve.point(phase)))
     state = np.concatenate([off, rate, off - river.sampling.period * rate, rate])
     trial = Trial(curve, phase, river.b_d, river.sampling, hand, away / max(np.linalg.norm(away), 1e-12))
-    path = hand_path(trial, river.k_r, TICKS, EVERYTHING, state)
+    path = hand_path(trial, river.k_r, TICKS, FULL_CONDITIONS, state)
     if len(path) < TICKS:
         return Outcome(np.inf, np.inf)
     distance = closest_phases(curve.packed(), path)[1]

@@ -22,9 +22,9 @@ from experiments.studies.trial_onset import observed, observed_with_friction, pr
 _WORLD_INTEGRATOR = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
 FINER = Conditions(substeps=128)
-OWN_FINE, OWN_COARSE = Conditions(64, _WORLD_INTEGRATOR), Conditions(8, _WORLD_INTEGRATOR)
+INTEGRATOR_FINE, INTEGRATOR_COARSE = Conditions(64, _WORLD_INTEGRATOR), Conditions(8, _WORLD_INTEGRATOR)
 COARSE = 1e-4  # [m] a few encoder counts: a smaller oscillation is mostly quantisation
-RUBBING, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
+WITH_COULOMB_FRICTION, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,10 @@ def run_trial(trial: Trial) -> Row:
     return Row(
         period=trial.sampling.period, delay=trial.sampling.delay, cutoff=trial.sampling.cutoff, b_d=trial.b_d,
         mass=trial.hand.mass, damping=trial.hand.damping, stiffness=trial.hand.stiffness,
-        predicted=expected, observed=observed(trial, expected, FINE), own_fine=observed(trial, expected, OWN_FINE),
-        own_coarse=observed(trial, expected, OWN_COARSE), amplitude=amplitude, friction_predicted=rubbing.k_r,
-        friction_observed=observed_with_friction(trial, rubbing, amplitude, RUBBING),
+        predicted=expected, observed=observed(trial, expected, FINE),
+        own_fine=observed(trial, expected, INTEGRATOR_FINE), own_coarse=observed(trial, expected, INTEGRATOR_COARSE),
+        amplitude=amplitude, friction_predicted=rubbing.k_r,
+        friction_observed=observed_with_friction(trial, rubbing, amplitude, WITH_COULOMB_FRICTION),
         rounded_observed=observed_with_friction(trial, rubbing, amplitude, ROUNDED) if amplitude > COARSE else np.nan,
     )  # fmt: skip
 

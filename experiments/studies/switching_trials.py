@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.switching.switching import Keeping, Sharing
+from controllers.certificates.switching.switching import HandRetention, SelectionRule
 from controllers.certificates.switching.switching_search import Push, failure
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
@@ -28,7 +28,10 @@ from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
 
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] pushes that are tried on every crossing, up to 4 N
-NONE, NEVER = 0.025, 5.7  # [N] coordinates in the picture of crossings not certified, and of hands that are never lost
+UNCERTIFIED_FORCE, NEVER_LOST_FORCE = (
+    0.025,
+    5.7,
+)  # [N] coordinates in the picture of crossings not certified, and of hands that are never lost
 
 
 def straight_pair(degrees: float, form: str, hysteresis: float, drag: float = 4.0) -> HigherOrder:
@@ -80,8 +83,8 @@ def draw_crossing(rng: np.random.Generator) -> Crossing:
     field = straight_pair(degrees, "discrete", float(rng.uniform(0.0, 3.0)), float(rng.uniform(4.0, 20.0)))
     sampling = Sampling(float(rng.choice([5e-4, 1e-3])), 0.0, float(rng.uniform(25.0, 100.0)))
     first, second = certified_bundle(field.bundle, phantom_device(), sampling)
-    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
-    allowed = Keeping(first, (second,), sharing).allowed(2.0)
+    sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
+    allowed = HandRetention(first, (second,), sharing).allowed(2.0)
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     return Crossing(
@@ -106,16 +109,21 @@ def outcomes_figure(number: int) -> Figure:
     """Certified force against the least of `PUSHES` that loses the hand in MuJoCo, for random crossings."""
     rng = np.random.default_rng(1)
     crossings = [draw_crossing(rng) for _ in range(number)]
-    lost = [next((force for force in PUSHES if not it.kept(force)), NEVER) for it in crossings]
-    x = [it.allowed if it.allowed > 0.0 else NONE for it in crossings]
+    lost = [next((force for force in PUSHES if not it.kept(force)), NEVER_LOST_FORCE) for it in crossings]
+    x = [it.allowed if it.allowed > 0.0 else UNCERTIFIED_FORCE for it in crossings]
     figure = Figure(figsize=(5.6, 4.4), layout="constrained")
     ax = figure.subplots()
-    ends = np.array([NONE, NEVER])
+    ends = np.array([UNCERTIFIED_FORCE, NEVER_LOST_FORCE])
     ax.fill_between(ends, [PUSHES[0] / 2.0] * 2, ends, color="#fbe9e7", lw=0, label="would refute the certificate")
     dots = ax.scatter(x, lost, c=[it.degrees for it in crossings], cmap="viridis", s=28, vmin=0.0, vmax=90.0)
-    ax.set(xscale="log", yscale="log", xlim=(NONE / 1.3, NEVER * 1.2), ylim=(PUSHES[0] / 1.5, NEVER * 1.2))
-    ax.set_xticks([NONE, 0.1, 0.3, 1.0, 3.0], ["none", "0.1", "0.3", "1", "3"])
-    ax.set_yticks([*PUSHES[::2], NEVER], [*(f"{force:.2g}" for force in PUSHES[::2]), "kept"])
+    ax.set(
+        xscale="log",
+        yscale="log",
+        xlim=(UNCERTIFIED_FORCE / 1.3, NEVER_LOST_FORCE * 1.2),
+        ylim=(PUSHES[0] / 1.5, NEVER_LOST_FORCE * 1.2),
+    )
+    ax.set_xticks([UNCERTIFIED_FORCE, 0.1, 0.3, 1.0, 3.0], ["none", "0.1", "0.3", "1", "3"])
+    ax.set_yticks([*PUSHES[::2], NEVER_LOST_FORCE], [*(f"{force:.2g}" for force in PUSHES[::2]), "kept"])
     ax.minorticks_off()
     ax.set(xlabel="force that is certified [N]", ylabel="least force that loses the hand in MuJoCo [N]")
     ax.legend(loc="lower right", fontsize=8)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers.state import Array
-from experiments.trials.analysis.mixed_model import LEVEL
+from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL
 from experiments.tuning.tune_config import TuneConfig, read_tuning
 from experiments.tuning.tuning import Tuned, run_tuning
 
@@ -56,7 +56,9 @@ def t_interval(values: Array) -> tuple[float, float]:
 
     if len(values) < 2:
         return float("nan"), float("nan")
-    half = float(t.ppf(0.5 + 0.5 * LEVEL, len(values) - 1)) * float(np.std(values, ddof=1)) / len(values) ** 0.5
+    half = (
+        float(t.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, len(values) - 1)) * float(np.std(values, ddof=1)) / len(values) ** 0.5
+    )
     return float(np.mean(values)) - half, float(np.mean(values)) + half
 
 

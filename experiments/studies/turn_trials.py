@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.certificates.flight.ballistic import BodyMotion
-from controllers.certificates.flight.tolerance import JUDGING
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA
 from controllers.gravity import GRAVITY
 from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
@@ -172,7 +172,7 @@ def main(names: list[str]) -> None:
         if verdict.verdict != "refuted":
             print(f"| {clip.name} | {pace:.2f} | {verdict.reason} |")
             continue
-        done = trial(played.motion, verdict.counterexample, JUDGING.friction)
+        done = trial(played.motion, verdict.counterexample, DEFAULT_CRITERIA.friction)
         print(
             f"| {clip.name} | {pace:.2f} | {done.rate:.3f} | "
             f"{done.onset:.3f} | {100.0 * (done.onset / done.rate - 1.0):+.2f} % | {1e3 * done.bound:.1f} mm | "

@@ -9,24 +9,24 @@ from typing import Any
 
 from rich.console import Console
 
-from controllers.checks import check_kinds, of_kind
-from experiments.certify.kept_stability import kept_stability
-from experiments.config.keywords import in_keywords
+from controllers.checks import check_field_types, check_kind
+from experiments.certify.kept_stability import cached_stability
+from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_json
 from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
-from experiments.trials.analysis.tidy import TABLE_CSV, TABLE_PARQUET, table, write_table
+from experiments.trials.analysis.tidy import TABLE_CSV, TABLE_PARQUET, trial_table, write_table
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.plan import Trial, code_hash, planned
-from experiments.trials.design.study_config import StudyConfig, read_toml, study_from
+from experiments.trials.design.plan import Trial, code_hash, plan_trials
+from experiments.trials.design.study_config import StudyConfig, parse_study, read_toml
 from experiments.trials.execution.database import Database
-from experiments.trials.execution.drive import run_missing, warm
+from experiments.trials.execution.drive import compile_and_make_maps, run_missing
 from experiments.trials.execution.executors import executor
-from experiments.trials.execution.recordings_place import check_place
+from experiments.trials.execution.recordings_place import check_writable
 from experiments.trials.execution.where import Where
-from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
-from experiments.trials.trial.run_trial import SHELF, Row
+from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
+from experiments.trials.trial.run_trial import MAP_CACHE, Row
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -82,7 +82,7 @@ class Study:
     text: str = ""
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
 
     @staticmethod
     def load(path: str | Path) -> "Study":
@@ -94,7 +94,7 @@ class Study:
             If it cannot be read, or contains an unknown entry.
         """
         file = given_path("path", path)
-        config = study_from(read_toml(file, "a study"), str(file))
+        config = parse_study(read_toml(file, "a study"), str(file))
         return Study(config, file.read_text(encoding="utf-8"))
 
     @staticmethod
@@ -106,7 +106,7 @@ class Study:
         ControllerError
             If there is an unknown entry.
         """
-        return Study(study_from(values, "study"))
+        return Study(parse_study(values, "study"))
 
     def with_users(self, number: int | None = None, seed: int | None = None) -> "Study":
         """The same study with another number of users, or another seed of trials and population."""
@@ -114,10 +114,10 @@ class Study:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
-        """All planned trials; see `experiments.trials.design.plan.planned`."""
-        return planned(self.config)
+        """All planned trials; see `experiments.trials.design.plan.plan_trials`."""
+        return plan_trials(self.config)
 
-    @in_keywords()
+    @with_keyword_messages()
     def run(
         self, out: str | Path, threads: int | None = None, workers: int | None = None, cluster: str | None = None,
         console: Console | None = None,
@@ -144,20 +144,20 @@ class Study:
             trials are kept.
         """
         folder, where = given_path("out", out), Where(threads=threads, workers=workers, cluster=cluster)
-        of_kind("console", console, Console | None)
+        check_kind("console", console, Console | None)
         console = console or Console(stderr=True)
         measures, trials = self._measures(), self.trials
         if self.config.recordings:
-            check_place(self.config.recordings)
+            check_writable(self.config.recordings)
         _check_folder(folder)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             self._refuse_fewer(folder, database)
-            warm((trial.config for trial in trials), SHELF, console)
+            compile_and_make_maps((trial.config for trial in trials), MAP_CACHE, console)
             with executor(where) as pool:
                 ran = run_missing(trials, database, pool, self.config.recordings, console, _descriptions(trials))
             planned_keys = {trial.key for trial in trials}
             rows = {row.key: row for row in database.rows() if row.key in planned_keys}
-        frame = table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})
+        frame = trial_table(trials, rows, measures, self._margins(trials) if "margin_used" in measures else {})
         write_table(frame, folder)
         return self._report(folder, frame, rows, ran, console)
 
@@ -198,11 +198,11 @@ class Study:
 
     def _measures(self) -> tuple[str, ...]:
         config = self.config
-        kinds = {trial.config.figure.kind for trial in planned(replace(config, repetitions=1))}
+        kinds = {trial.config.figure.kind for trial in plan_trials(replace(config, repetitions=1))}
         available = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
         optional = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure may lack default measures
         for word, name in (("ease", config.ease), ("cost", config.cost)):
-            if name in OF_CONDITIONS:
+            if name in CONDITION_MEASURES:
                 raise StudyError(f"study {config.name!r}: {word} = {name!r} is of a condition; expected one of a trial")
         for name in (*config.measures, config.ease, config.cost):
             if name not in MEASURES:
@@ -218,7 +218,7 @@ class Study:
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
-        return {trial.meeting.number: kept_stability(trial.config).used for trial in _one_per_condition(trials)}
+        return {trial.meeting.number: cached_stability(trial.config).used for trial in _one_per_condition(trials)}
 
 
 def _check_folder(folder: Path) -> None:

@@ -12,14 +12,14 @@ from controllers.certificates.loop.stability import critical_stiffness
 from controllers.errors import ControllerError
 from controllers.state import Array
 from experiments.certify.certify import certified_rivers
-from experiments.certify.kept_stability import Stability, kept_stability
+from experiments.certify.kept_stability import Stability, cached_stability
 from experiments.config.run_config import RunConfig
 from experiments.trials.analysis.statistics import RESAMPLES
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
 from experiments.tuning.tune_config import TuneConfig
 
-HALF = 0.5  # share of the critical gain: Ziegler and Nichols, "Optimum settings for automatic controllers", 1942
+GAIN_RATIO = 0.5  # share of the critical gain: Ziegler and Nichols, "Optimum settings for automatic controllers", 1942
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,12 @@ def half_critical(config: TuneConfig) -> dict[str, float] | None:
     except ControllerError:
         return None
     loops = [SampledLoop(river.still(hand), river.sampling) for hand in HandRange().hands()]
-    return {"stiffness": HALF * min(float(critical_stiffness(loop, river.b_d).min()) for loop in loops)}
+    return {"stiffness": GAIN_RATIO * min(float(critical_stiffness(loop, river.b_d).min()) for loop in loops)}
 
 
 def _evaluate(config: TuneConfig, name: str, values: dict[str, float], panel: Panel) -> Contender:
     candidate = config.config(values)
-    stability = kept_stability(candidate)
+    stability = cached_stability(candidate)
     if violation_of(config, stability) > 0.0 and stability.verdict == "refuted":
         no_results = np.full((config.held_back.number, len(config.objectives)), np.nan)
         return Contender(name, values, candidate, stability, no_results)
@@ -114,7 +114,7 @@ def interval(differences: Array, seed: int) -> tuple[float, float]:
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
-def wins(contender: Contender, tuned: Contender, directions: Sequence[str]) -> Array:
+def signed_gains(contender: Contender, tuned: Contender, directions: Sequence[str]) -> Array:
     """Differences between a contender and the tuned one by user and objective, positive where the tuned is better."""
     signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
     return signs * (contender.by_user - tuned.by_user)

@@ -9,7 +9,7 @@ from controllers.state import Array
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.plan import key_of
+from experiments.trials.design.plan import trial_key
 from experiments.trials.design.study_config import Users
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import Executor
@@ -58,7 +58,7 @@ class Panel:
         StudyError
             If no trial has one of the measures.
         """
-        keys = [[key_of(run) for run in own] for own in runs]
+        keys = [[trial_key(run) for run in own] for own in runs]
         run_by_key = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}
         missing = [Task(key, to_json(run)) for key, run in run_by_key.items() if key not in self._rows]
         for row in self._executor.rows(missing) if missing else ():

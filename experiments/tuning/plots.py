@@ -9,7 +9,7 @@ from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import boundary
 from controllers.errors import ControllerError
 from experiments.certify.certify import certified_rivers
-from experiments.tuning.search import Candidate, front
+from experiments.tuning.search import Candidate, pareto_front
 from experiments.tuning.tune_config import TuneConfig, label_of, more_is_better
 
 _TRIED, _FRONT, _CHOSEN, _REFUSED = "#7f8ea3", "#1f5fbf", "#d9542b", "#b04040"
@@ -46,7 +46,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
 def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
     """Pareto front of the first two objectives alone, sorted by the first, shape (n, 2)."""
     two = [c._replace(objectives=c.objectives[:2]) for c in tried if c.objectives is not None]
-    return np.array(sorted(c.objectives for c in front(two, config.directions[:2]) if c.objectives is not None))
+    return np.array(sorted(c.objectives for c in pareto_front(two, config.directions[:2]) if c.objectives is not None))
 
 
 def gains_figure(

@@ -7,9 +7,9 @@ import numpy as np
 import optuna
 from optuna.trial import TrialState
 
-from experiments.certify.kept_stability import Stability, kept_stability
+from experiments.certify.kept_stability import Stability, cached_stability
 from experiments.tuning.panel import Panel, panel_runs
-from experiments.tuning.samplers import REFUSED_MOST, STARTUP, sampler_of
+from experiments.tuning.samplers import MAX_PROPOSALS_RATIO, RANDOM_STARTUP_COUNT, sampler_of
 from experiments.tuning.tune_config import TuneConfig
 
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -67,7 +67,7 @@ def search(
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     study = optuna.create_study(
         storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
-        pruner=optuna.pruners.MedianPruner(n_startup_trials=STARTUP, n_warmup_steps=1),
+        pruner=optuna.pruners.MedianPruner(n_startup_trials=RANDOM_STARTUP_COUNT, n_warmup_steps=1),
     )  # fmt: skip
     space: dict[str, optuna.distributions.BaseDistribution] = {
         word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
@@ -78,7 +78,7 @@ def search(
     while True:
         simulated, proposed = _count_simulated(study), len(study.get_trials(deepcopy=False, states=_FINISHED))
         progress(simulated)
-        if simulated >= config.candidates or proposed >= REFUSED_MOST * config.candidates:
+        if simulated >= config.candidates or proposed >= MAX_PROPOSALS_RATIO * config.candidates:
             return candidates_of(study)
         study.sampler = sampler_of(sampler, config.seed, proposed)
         _try_candidate(config, study, study.ask(space), panel)
@@ -91,7 +91,7 @@ def _count_simulated(study: optuna.Study) -> int:
 
 def _try_candidate(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
     candidate = config.config(trial.params)
-    stability = kept_stability(candidate)
+    stability = cached_stability(candidate)
     violation = violation_of(config, stability)
     trial.set_user_attr("verdict", stability.verdict)
     trial.set_user_attr("margin", stability.margin)
@@ -143,7 +143,7 @@ def candidates_of(study: optuna.Study) -> list[Candidate]:
     return candidates
 
 
-def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
+def pareto_front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
     """The Pareto front: candidates that no other one dominates."""
     tried = [candidate for candidate in candidates if candidate.objectives is not None]
     signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
@@ -154,12 +154,12 @@ def front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Ca
     ]  # fmt: skip
 
 
-def chosen(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
+def best_candidate(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
     """The best candidate for one objective; for several, the candidate on the front nearest to the ideal point.
 
     Objectives are scaled to their range on the front. None if no candidate was tried.
     """
-    best = front(candidates, directions)
+    best = pareto_front(candidates, directions)
     if not best:
         return None
     signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])

@@ -11,16 +11,16 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from controllers.certificates.report import hash_of
-from controllers.checks import check_kinds, numbers_of, of_kind, takes
+from controllers.checks import check_callable, check_field_types, check_kind, numbers_of
 from controllers.errors import ParameterError
 from controllers.state import Array
 from experiments.certify.certify_simulation import certify
-from experiments.config.keywords import in_keywords
+from experiments.config.keywords import with_keyword_messages
 from experiments.files.given_path import given_path
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
-from experiments.trials.design.study_config import MOST_TRIALS, check_trials
+from experiments.trials.design.study_config import MAX_TRIALS, check_trials
 
 Cost = Callable[[Run], float | Sequence[float]]
 
@@ -61,10 +61,10 @@ class Search:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         for name in ("candidates", "costs", "threads"):
-            if not 1 <= getattr(self, name) <= MOST_TRIALS:
-                raise ParameterError(f"{name} is {getattr(self, name)}; expected 1 to {MOST_TRIALS}")
+            if not 1 <= getattr(self, name) <= MAX_TRIALS:
+                raise ParameterError(f"{name} is {getattr(self, name)}; expected 1 to {MAX_TRIALS}")
         if not 0 <= self.seed < 2**63:
             raise ParameterError(f"seed is {self.seed}; expected 0 or more and less than {2**63}")
         if self.journal is not None:
@@ -97,7 +97,7 @@ class TunedSimulation:
     refused: int
 
 
-@in_keywords()
+@with_keyword_messages()
 def tune(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, panel: Sequence[User] = (),
     seconds: float = 6.0, search: Search | None = None,
@@ -127,13 +127,13 @@ def tune(
     """
     import optuna  # an optional dependency, which takes half a second to import
 
-    from experiments.tuning.samplers import REFUSED_MOST
+    from experiments.tuning.samplers import MAX_PROPOSALS_RATIO
 
-    of_kind("sim", sim, Simulation)
-    of_kind("panel", panel, Sequence[User])
-    of_kind("seconds", seconds, float)
-    of_kind("search", search, Search | None)
-    takes("cost", cost, "a run")
+    check_kind("sim", sim, Simulation)
+    check_kind("panel", panel, Sequence[User])
+    check_kind("seconds", seconds, float)
+    check_kind("search", search, Search | None)
+    check_callable("cost", cost, "a run")
     search, users = search or Search(), tuple(panel) or (sim.user,)
     check_trials("tuning", search.candidates * len(users), f"{search.candidates} candidates, {len(users)} users")
     _check_space(space)
@@ -143,7 +143,7 @@ def tune(
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _create_study(search, _study_name(sim, space, cost, len(users), seconds, search))
     complete, distributions = (optuna.trial.TrialState.COMPLETE,), _distributions(space)
-    for number in range(len(study.trials), REFUSED_MOST * search.candidates):
+    for number in range(len(study.trials), MAX_PROPOSALS_RATIO * search.candidates):
         if len(study.get_trials(states=complete)) >= search.candidates:
             break
         trial = _ask_candidate(study, search, distributions, number)
@@ -166,12 +166,12 @@ def tune(
 
 def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
     """Refuse a space without parameters, and an invalid range."""
-    of_kind("space", space, Mapping)
+    check_kind("space", space, Mapping)
     if not space:
         raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
     for path, bounds in space.items():
-        of_kind("a path of the space", path, str)
-        of_kind(path, bounds, Sequence[float])
+        check_kind("a path of the space", path, str)
+        check_kind(path, bounds, Sequence[float])
         if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
 

@@ -8,13 +8,13 @@ from typing import Any, Literal, cast
 from pydantic import Field
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import keywords
-from experiments.config.part import above, at_least, from_dict, part, whole
+from experiments.config.keywords import to_keywords
+from experiments.config.part import above, at_least, from_dict, part, whole_number
 from experiments.config.run_config import RunConfig
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import LONGEST, Users, Words, check_trials, read_toml
-from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS, measures_of
+from experiments.trials.design.study_config import MAX_TRIAL_DURATION, Users, Words, check_trials, read_toml
+from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from sim.users.person.population import population
 
 MARGIN = "margin"
@@ -88,14 +88,14 @@ class TuneConfig:
     users: Users = Users(number=6, seed=1)
     held_back: Users = Users(number=12, seed=2)
     tasks: tuple[str, ...] = ()
-    repetitions: int = whole(1, default=1)
-    seconds: float = above(0.0, default=6.0, unit="s", most=LONGEST)
-    candidates: int = whole(1, default=40)
+    repetitions: int = whole_number(1, default=1)
+    seconds: float = above(0.0, default=6.0, unit="s", most=MAX_TRIAL_DURATION)
+    candidates: int = whole_number(1, default=40)
     sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
     prune: bool = True
     least_margin: float = at_least(0.0, default=0.0)
     allow_unknown: bool = False
-    seed: int = whole(0, default=1)
+    seed: int = whole_number(0, default=1)
     storage: str = ""
 
     def __post_init__(self) -> None:
@@ -130,7 +130,7 @@ class TuneConfig:
         try:
             return run_config(**words)
         except ParameterError as error:
-            raise StudyError(f"tuning {self.name!r}: {keywords(str(error))}") from None
+            raise StudyError(f"tuning {self.name!r}: {to_keywords(str(error))}") from None
 
 
 def more_is_better(objective: str) -> bool:
@@ -190,7 +190,7 @@ def _check_space(config: TuneConfig, where: str) -> None:
 
 
 def _check_objectives(config: TuneConfig, where: str) -> None:
-    trial_measures = [name for name in MEASURES if name not in OF_CONDITIONS]
+    trial_measures = [name for name in MEASURES if name not in CONDITION_MEASURES]
     for name in config.objectives:
         if name != MARGIN and name not in trial_measures:
             raise StudyError(f"{where}: no objective {name!r}; there are {', '.join([*trial_measures, MARGIN])}")

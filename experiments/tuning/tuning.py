@@ -16,15 +16,15 @@ from experiments.config.part import to_json
 from experiments.files.json_text import json_text
 from experiments.trials.design.errors import StudyError
 from experiments.trials.execution.database import Database
-from experiments.trials.execution.drive import warm
+from experiments.trials.execution.drive import compile_and_make_maps
 from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
-from experiments.trials.trial.run_trial import SHELF
-from experiments.tuning.contenders import Contender, contenders, interval, wins
+from experiments.trials.trial.run_trial import MAP_CACHE
+from experiments.tuning.contenders import Contender, contenders, interval, signed_gains
 from experiments.tuning.page import tuning_page
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.plots import gains_figure, objectives_figure
-from experiments.tuning.search import Candidate, chosen, search
+from experiments.tuning.search import Candidate, best_candidate, search
 from experiments.tuning.storage import storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
 
@@ -116,11 +116,13 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
     console, text = Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
-        warm(panel_runs(config, config.config({}), replace(config.users, number=1))[0], SHELF, console)
+        compile_and_make_maps(
+            panel_runs(config, config.config({}), replace(config.users, number=1))[0], MAP_CACHE, console
+        )
         with executor(where or Where()) as pool:
             panel, storage = Panel(database, pool), storage_of(config.storage or out / JOURNAL)
             found = _run_search(config, storage, identity, panel, config.sampler, console)
-            best = chosen(found, config.directions)
+            best = best_candidate(found, config.directions)
             if best is None:
                 refused = sum(c.state == "refused" for c in found)
                 raise StudyError(
@@ -130,7 +132,7 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
             others: dict[str, Candidate | None] = {}
             if config.sampler != "random":
                 random_candidates = _run_search(config, storage, identity, panel, "random", console)
-                others[RANDOM] = chosen(random_candidates, config.directions)
+                others[RANDOM] = best_candidate(random_candidates, config.directions)
             with console.status("held-back users"):
                 judged = contenders(config, best, others, panel)
     return _write_results(config, out, text, found, best, judged)
@@ -173,7 +175,7 @@ def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison
     """Comparisons of every other contender with the first one, which is the tuned one, on every objective."""
     comparisons: list[Comparison] = []
     for contender in judged[1:]:
-        gains = wins(contender, judged[0], config.directions)
+        gains = signed_gains(contender, judged[0], config.directions)
         for k, objective in enumerate(config.objectives):
             low, high = interval(gains[:, k], config.seed)
             means = float(contender.means[k]), float(judged[0].means[k])

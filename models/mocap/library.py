@@ -17,7 +17,7 @@ from models.mocap.readers.deepmimic import read_deepmimic
 from models.mocap.readers.motion_file import MotionFileError, numbered_lines
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.bodies import bodies
+from models.mocap.retargeting.bodies import people_hips
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.retarget_report import RetargetReport, copy_remarks, floor_remarks
@@ -106,7 +106,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
             what = f"it is on the figure's own skeleton, whatever {' and '.join(estimated)} would state"
             raise MotionFileError(path, 0, what, f"no {' or '.join(estimated)}")
         return Loaded(clip, None)
-    people = bodies(motion)
+    people = people_hips(motion)
     if hints.roles is not None:
         motion, roles = stated_roles(hints.roles, motion, people)
     else:

@@ -151,7 +151,7 @@ def joint_torques(theta: Vec3, f_P: Vec3) -> Scalars3:
 
 
 @njit
-def least_gain(theta: Vec3) -> float:
+def min_singular_value(theta: Vec3) -> float:
     """Least singular value of J(θ) [m/rad].
 
     The turret moves the tip sideways, with the tip's distance |ρ| from the turret's axis as lever arm; upper arm and
@@ -169,9 +169,9 @@ def least_gain(theta: Vec3) -> float:
 def force_from_torques(theta: Vec3, torque: Vec3, least: float) -> Scalars3:
     """F = J⁻ᵀ τ: force at the tip [N] equivalent to torques at the joints [N m], in the device frame.
 
-    The inverse of `joint_torques`; zero where `least_gain` is below `least` [m/rad].
+    The inverse of `joint_torques`; zero where `min_singular_value` is below `least` [m/rad].
     """
-    if least_gain(theta) < least:
+    if min_singular_value(theta) < least:
         return 0.0, 0.0, 0.0
     s1, c1 = np.sin(theta[0]), np.cos(theta[0])
     s2, c2 = np.sin(theta[1]), np.cos(theta[1])

@@ -152,4 +152,4 @@ PREMIUM_1_5 = PhantomParameters(
     gimbal_limit=(_radians(-148.5, 148.5), _radians(-130, 130), _radians(-167.5, 167.5)),
 )
 
-LEAST_TIP = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0
+MIN_TIP_MASS = 0.03  # [kg] apparent mass of the bare linkage at the tip in its lightest direction, at θ = 0

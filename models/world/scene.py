@@ -15,7 +15,7 @@ from models.robot_arm.spec import arm_spec
 PHANTOM = "phantom/"
 FIGURE = "figure/"
 ROBOT = "robot/"
-MOST_SUBSTEPS = 1000  # largest number in a servo period, 1 µs each at 1 kHz; a tick stores a row for each
+MAX_SUBSTEPS = 1000  # largest number in a servo period, 1 µs each at 1 kHz; a tick stores a row for each
 FIRST_HIDDEN_GROUP = 3  # MuJoCo's convention: geoms of groups 3 to 5 are for collision, not for display
 PEDESTAL = 0.45  # height of the robot arm's base [m]
 R_WP: npt.NDArray[np.float64] = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -59,10 +59,10 @@ class SceneConfig:
                 "expected 0 < physics_step ≤ servo_period ≤ 0.1 s"
             )
         ratio = self.servo_period / self.physics_step
-        if ratio > MOST_SUBSTEPS + 0.5:
+        if ratio > MAX_SUBSTEPS + 0.5:
             raise ModelError(
                 f"the physics step {self.physics_step:g} s divides the servo period {self.servo_period:g} s into "
-                f"{ratio:.3g} steps; expected at most {MOST_SUBSTEPS}, {self.servo_period / MOST_SUBSTEPS:g} s or more"
+                f"{ratio:.3g} steps; expected at most {MAX_SUBSTEPS}, {self.servo_period / MAX_SUBSTEPS:g} s or more"
             )
         if abs(ratio - round(ratio)) > 1e-6:
             raise ModelError(

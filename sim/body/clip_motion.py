@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
-from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 
 _N_MARGIN_FRAMES = 8  # of the neighbouring laps at each end: the effect of a spline's end decays to 0.27⁸ = 3e-5
 
@@ -73,7 +73,7 @@ def _relative_vector(q: Array, r: Array) -> Array:
 def _frames(clip: Clip, end: float) -> tuple[Array, int]:
     """Frames from before time 0 to beyond `end` [s], and the index of the frame at time 0."""
     n_needed = int(np.ceil(end * clip.fps)) + _N_MARGIN_FRAMES + 1
-    if not clip.closes(CLOSES):
+    if not clip.closes(CLOSURE_TOLERANCE):
         held_frames = np.repeat(clip.poses[-1:], max(n_needed - clip.n_frames, 1), axis=0)
         return np.concatenate((clip.poses, held_frames)), 0
     lap = clip.poses[:-1]

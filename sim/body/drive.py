@@ -12,7 +12,7 @@ from numba.extending import overload
 
 from controllers.fields.algebra.instructions import VECTOR
 from controllers.kernel_call import call_as_given
-from controllers.lent import Lent, lend
+from controllers.lent import Lent, by_pointer
 from controllers.state import Array, IntArray
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
@@ -61,14 +61,14 @@ def follow(units: IntArray, body: BodyState, reference: CompiledReference, argum
 def _update_and_drive(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0 or units[1] == 0:
         raise SimError("what updates and drives the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (lend(reference), argument, trace))
-    call_as_given(units[1], (lend(body), reference.pose, reference.velocity, reference.acceleration))
+    call_as_given(units[0], (by_pointer(reference), argument, trace))
+    call_as_given(units[1], (by_pointer(body), reference.pose, reference.velocity, reference.acceleration))
 
 
 def _update_reference(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:
     if units[0] == 0:
         raise SimError("what updates the figure is not compiled; take the servo's `linked`")
-    call_as_given(units[0], (lend(reference), argument, trace))
+    call_as_given(units[0], (by_pointer(reference), argument, trace))
 
 
 def _do_nothing(units: IntArray, body: Any, reference: CompiledReference, argument: Array, trace: Array) -> None:

@@ -2,8 +2,8 @@ r"""Fall detection and recovery: a fallen figure lies for a second and is then s
 
 The figure has fallen when trunk, head or legs touch the floor while the reference has them well above it, or when it
 touches the floor with its root half a metre from the reference's. Its motors are then off. After lying for
-`LIES`, it tracks for `RISES` an interpolation from the pose (p₀, R₀) in which it lay to the reference (p, R). The
-position p of the root is interpolated, and the offset of every rotation R from the reference decays:
+`LYING_TIME`, it tracks for `RECOVERY_TIME` an interpolation from the pose (p₀, R₀) in which it lay to the reference
+(p, R). The position p of the root is interpolated, and the offset of every rotation R from the reference decays:
 
 .. math:: p(u) = p_0 + S(u)\,(p - p_0) + 16\,u^2 (1 - u)^2\,h\,e_z , \qquad
           R(u) = R\,\exp((1 - S(u))\,\log(R^T R_0)|_{u=0}) , \qquad 0 \le u \le 1 ,
@@ -23,10 +23,12 @@ from controllers.state import Array, IntArray
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT
 from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 
-UP, DOWN, SET_BACK = 0.0, 1.0, 2.0
-TOUCHES = 2e-3  # [m] height below which a body touches the floor: about the softness of MuJoCo's contacts
-FALLEN = 0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
-LIES, RISES = 1.0, 1.0  # [s] duration of lying on the floor, and of the return to the animation
+UP, DOWN, RECOVERING = 0.0, 1.0, 2.0
+TOUCH_HEIGHT = 2e-3  # [m] height below which a body touches the floor: about the softness of MuJoCo's contacts
+MAX_ROOT_DISTANCE = (
+    0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
+)
+LYING_TIME, RECOVERY_TIME = 1.0, 1.0  # [s] duration of lying on the floor, and of the return to the animation
 _REFERENCE_CLEARANCE = (
     0.05  # [m] height above which a reference body is clear of the floor; a standing shank is at 0.058
 )
@@ -52,7 +54,7 @@ class FallState(NamedTuple):
     pos, mat, twin_pos, twin_mat : Array
         Positions (ngeom, 3) and rotation matrices (ngeom, 9) of all geoms, of the world and of the twin.
     state : Array
-        `UP`, `DOWN` or `SET_BACK`; time spent lying or being set back [s]; number of falls; shape (3,).
+        `UP`, `DOWN` or `RECOVERING`; time spent lying or being set back [s]; number of falls; shape (3,).
     lying, way : Array
         p₀ (3,), and the tangent from the reference pose to the pose in which it lay, at that time (57,).
     target, before, velocity, still : Array
@@ -90,7 +92,7 @@ def _lowest_height(kind: int, size: Array, pos: Array, mat: Array) -> float:
 
 @njit
 def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: float) -> float:
-    """Update and return the mode of this period: `UP`, `DOWN` or `SET_BACK`.
+    """Update and return the mode of this period: `UP`, `DOWN` or `RECOVERING`.
 
     Parameters
     ----------
@@ -104,9 +106,9 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
         Height of the figure's lowest contact point [m].
     """
     state, lowest, fallen = fall.state, sole, False
-    if state[_MODE] == SET_BACK:
+    if state[_MODE] == RECOVERING:
         state[_MODE_TIME] += fall.period
-        if state[_MODE_TIME] > RISES:
+        if state[_MODE_TIME] > RECOVERY_TIME:
             state[_MODE] = UP
         return state[_MODE]
     for k in range(fall.geoms.shape[0]):
@@ -115,17 +117,17 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
         lowest = min(lowest, height)
         if height < 0.0 and _lowest_height(kind, size, fall.twin_pos[twin], fall.twin_mat[twin]) > _REFERENCE_CLEARANCE:
             fallen = True
-    touches = lowest < TOUCHES
+    touches = lowest < TOUCH_HEIGHT
     if state[_MODE] == UP:
         root_distance = np.sqrt((pose[0] - q_r[0]) ** 2 + (pose[1] - q_r[1]) ** 2 + (pose[2] - q_r[2]) ** 2)
-        if fallen or (touches and root_distance > FALLEN):
+        if fallen or (touches and root_distance > MAX_ROOT_DISTANCE):
             state[_MODE], state[_MODE_TIME] = DOWN, 0.0
             state[_FALL_COUNT] += 1.0
         return state[_MODE]
     if touches:
         state[_MODE_TIME] += fall.period
-    if state[_MODE_TIME] > LIES:
-        state[_MODE], state[_MODE_TIME] = SET_BACK, 0.0
+    if state[_MODE_TIME] > LYING_TIME:
+        state[_MODE], state[_MODE_TIME] = RECOVERING, 0.0
         fall.lying[:] = pose[:3]
         fall.before[:] = pose
         mj_differentiate_pos(model, fall.way.ctypes, 1.0, q_r.ctypes, pose.ctypes)
@@ -133,12 +135,12 @@ def update_fall(model: int, fall: FallState, pose: Array, q_r: Array, sole: floa
 
 
 @njit
-def follow_back(model: int, fall: FallState, q_r: Array) -> None:
+def update_recovery_target(model: int, fall: FallState, q_r: Array) -> None:
     """Write the pose and velocity that a figure tracks while it is set back to `target` and `velocity`.
 
     `model` is the address of the twin's model.
     """
-    u = fall.state[_MODE_TIME] / RISES
+    u = fall.state[_MODE_TIME] / RECOVERY_TIME
     share = smooth_step(u)
     fall.target[:] = q_r
     mj_integrate_pos(model, fall.target.ctypes, fall.way.ctypes, 1.0 - share)

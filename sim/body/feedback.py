@@ -22,7 +22,7 @@ def rotation_error(q: Array, q_r: Array, error: Array) -> None:
 
 
 @njit
-def turned(rotation: Array, vector: Array, out: Array) -> None:
+def rotate_by_vector(rotation: Array, vector: Array, out: Array) -> None:
     """Rotate a vector by a rotation vector, out = exp(rotation) vector (Rodrigues), all of shape (3,)."""
     angle = np.sqrt(rotation[0] ** 2 + rotation[1] ** 2 + rotation[2] ** 2)
     a = 1.0 - angle**2 / 6.0 if angle < 1e-4 else np.sin(angle) / angle
@@ -36,7 +36,7 @@ def turned(rotation: Array, vector: Array, out: Array) -> None:
 
 
 @njit
-def shorten(vector: Array, longest: float) -> bool:
+def limit_length(vector: Array, longest: float) -> bool:
     """Scale a vector of shape (3,) down to at most a length, in place; returns whether it was longer."""
     length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if length > longest:
@@ -63,21 +63,21 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
     rate = gains.root_rate
     for i in range(3):
         a[i] = 2.0 * rate * (v_r[i] - s.qvel[i]) + rate**2 * (q_r[i] - s.qpos[i])
-    shorten(a[:3], gains.root_pull)
+    limit_length(a[:3], gains.root_pull)
     rotated[:] = a_r[:3]
-    shorten(rotated, gains.linear_limit)
+    limit_length(rotated, gains.linear_limit)
     a[:3] += rotated
     for body in range(s.xpos.shape[0]):
         rate = gains.root_rate if body == 0 else gains.joint_rate
         p, t = 3 + 4 * body, 3 + 3 * body
         rotation_error(s.qpos[p : p + 4], q_r[p : p + 4], error)
-        turned(error, v_r[t : t + 3], rotated)
+        rotate_by_vector(error, v_r[t : t + 3], rotated)
         size = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
         stiffness = rate**2 * min(1.0, gains.joint_reach / max(size, 1e-12))
         for i in range(3):
             a[t + i] = 2.0 * rate * (rotated[i] - s.qvel[t + i]) + stiffness * error[i]
         if body == 0:
-            shorten(a[3:6], gains.root_turn)
-        turned(error, a_r[t : t + 3], rotated)
-        shorten(rotated, gains.angular_limit)
+            limit_length(a[3:6], gains.root_turn)
+        rotate_by_vector(error, a_r[t : t + 3], rotated)
+        limit_length(rotated, gains.angular_limit)
         a[t : t + 3] += rotated

@@ -25,7 +25,7 @@ import mujoco
 import numpy as np
 
 from controllers.kernel_call import call_as_given
-from controllers.lent import lend
+from controllers.lent import by_pointer
 from controllers.state import Array
 from models.humanoid.skeleton import (
     BODIES,
@@ -59,7 +59,7 @@ _MAY_BE_ZERO = ("force_bound", "moment_bound", "placement_reach")
 
 @entry_point
 def _update(drive: int, s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
-    call_as_given(drive, (lend(s), q_r, v_r, a_r))
+    call_as_given(drive, (by_pointer(s), q_r, v_r, a_r))
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from controllers.legs.sole_heights import SWINGS
+from controllers.legs.sole_heights import SWING_HEIGHT
 from controllers.state import Array, IntArray
-from sim.body.falls import TOUCHES, FallState
+from sim.body.falls import TOUCH_HEIGHT, FallState
 from sim.body.mass_matrix import MassMatrix
 
 N_FOOT = 4  # contact points of a foot
@@ -77,9 +77,9 @@ class FigureGains(NamedTuple):
     force_bound: float = 0.5
     moment_bound: float = 0.1
     reference_reach: float = 0.03
-    contact_reach: float = TOUCHES
+    contact_reach: float = TOUCH_HEIGHT
     settling_reach: float = 0.015
-    stance_height: float = SWINGS
+    stance_height: float = SWING_HEIGHT
     swing_speed: float = 1.0
     flight_height: float = 0.02
     lift_time: float = 0.02

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.state import Array
-from models.mocap.preparation.bounds import beyond
+from models.mocap.preparation.bounds import exceeding_text
 
-FORCE, MOMENT = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h
-SUPPORTS = 1.0  # [N] vertical ground reaction force above which the ground supports the figure
+MAX_FORCE_RATIO, MAX_MOMENT_RATIO = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h
+MIN_GROUND_FORCE = 1.0  # [N] vertical ground reaction force above which the ground supports the figure
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Residual:
 
     def brief(self) -> str:
         """RMS and peak of force and moment in percent, in words."""
-        force, force_max = _percent(self.force_rms, FORCE), _percent(self.force_max, FORCE)
-        moment, moment_max = _percent(self.moment_rms, MOMENT), _percent(self.moment_max, MOMENT)
+        force, force_max = _percent(self.force_rms, MAX_FORCE_RATIO), _percent(self.force_max, MAX_FORCE_RATIO)
+        moment, moment_max = _percent(self.moment_rms, MAX_MOMENT_RATIO), _percent(self.moment_max, MAX_MOMENT_RATIO)
         return (
             f"force {force} % and {force_max} % of weight, moment {moment} % and {moment_max} % of weight × height of "
             "the centre of mass"
@@ -48,23 +48,23 @@ class Residual:
     def missed(self) -> tuple[str, ...]:
         """Names of the bounds of Hicks et al. that are exceeded."""
         met = {
-            "RMS force": self.force_rms <= FORCE,
-            "peak force": self.force_max <= FORCE,
-            "RMS moment": self.moment_rms <= MOMENT,
-            "peak moment": self.moment_max <= MOMENT,
+            "RMS force": self.force_rms <= MAX_FORCE_RATIO,
+            "peak force": self.force_max <= MAX_FORCE_RATIO,
+            "RMS moment": self.moment_rms <= MAX_MOMENT_RATIO,
+            "peak moment": self.moment_max <= MAX_MOMENT_RATIO,
         }
         return tuple(name for name, is_met in met.items() if not is_met)
 
     def verdict(self) -> str:
         """Which of the bounds are met, in words."""
         missed = self.missed()
-        bounds = f"bounds of Hicks et al. 2015 (force {100 * FORCE:g} %, moment {100 * MOMENT:g} %)"
+        bounds = f"bounds of Hicks et al. 2015 (force {100 * MAX_FORCE_RATIO:g} %, moment {100 * MAX_MOMENT_RATIO:g} %)"
         return f"{bounds}: all met" if not missed else f"{bounds} missed by {', '.join(missed)}"
 
 
 def _percent(share: float, bound: float) -> str:
     """A share in percent, with enough decimals to distinguish it from a bound that it exceeds."""
-    return beyond(100.0 * share, 100.0 * bound) if share > bound else f"{100.0 * share:.1f}"
+    return exceeding_text(100.0 * share, 100.0 * bound) if share > bound else f"{100.0 * share:.1f}"
 
 
 class ResidualMeasure:

@@ -10,18 +10,18 @@ import numpy as np
 from numba import typeof, types
 
 from controllers.kernel_call import call_as_given
-from controllers.lent import lend
+from controllers.lent import by_pointer
 from controllers.state import Array, Mask
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
-from models.mocap.motion.clip import CLOSES, Clip, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
 from models.mocap.motion.spans import spans
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
 from sim.body.figure import CONTACTS, Figure, FigureGains, FigureState
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SIZE
-from sim.body.residual import SUPPORTS, Residual, ResidualMeasure
+from sim.body.residual import MIN_GROUND_FORCE, Residual, ResidualMeasure
 from sim.compilation.compiled import entry_point
 from sim.compilation.native import mj_step
 from sim.compilation.units import Unit
@@ -170,7 +170,7 @@ def _simulate(
 ) -> None:
     for k in range(reference.poses.shape[0]):
         log.poses[k] = s.qpos
-        call_as_given(drive, (lend(s), reference.poses[k], reference.velocities[k], reference.accelerations[k]))
+        call_as_given(drive, (by_pointer(s), reference.poses[k], reference.velocities[k], reference.accelerations[k]))
         for c in range(s.points.shape[0]):
             log.contacts[k, c] = s.contact_pos[s.contact[c]]
             log.contacts[k, c, 2] -= s.radius
@@ -225,7 +225,7 @@ def tracked_motion(
         figure.state.weight,
         standing_com(config.stature, config.mass),
         warnings,
-        math.inf if clip.closes(CLOSES) else clip.duration,
+        math.inf if clip.closes(CLOSURE_TOLERANCE) else clip.duration,
     )
 
 
@@ -245,7 +245,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
     period = float(times[1] - times[0]) if len(times) > 1 else 0.0
     up = motion.reports[:, REPORT_DOWN] == UP
     falls = times[~up & np.concatenate(([True], up[:-1]))]
-    in_flight, is_supported = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > SUPPORTS
+    in_flight, is_supported = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > MIN_GROUND_FORCE
     wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
     difference = pose_difference(motion.poses[up], motion.reference.poses[up])
     angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)

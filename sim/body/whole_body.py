@@ -5,8 +5,8 @@ from numba import njit
 from controllers.work_array import work_array
 from sim.body.cholesky import factor, substitute
 from sim.body.contact_forces import N_EDGES, cone_edges, shared_forces
-from sim.body.falls import DOWN, SET_BACK, UP, follow_back, update_fall
-from sim.body.feedback import shorten, wanted_acceleration
+from sim.body.falls import DOWN, RECOVERING, UP, update_fall, update_recovery_target
+from sim.body.feedback import limit_length, wanted_acceleration
 from sim.body.figure_state import (
     N_FOOT,
     REPORT_DOWN,
@@ -58,7 +58,7 @@ def figure_torque(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> None:
     elif mode == DOWN:
         s.ctrl[:] = 0.0
         s.wrench[:] = 0.0
-    elif mode == SET_BACK:
+    elif mode == RECOVERING:
         _control_recovery(s, q_r)
     s.applied[:] = s.wrench
     s.report[REPORT_SUPPORT] = support
@@ -79,9 +79,9 @@ def _saturated_count(torques: Array, limits: Array) -> int:
 @njit
 def _control_recovery(s: FigureState, q_r: Array) -> None:
     """Torques, and an unbounded wrench at the root, that carry a fallen figure back to the reference."""
-    follow_back(s.twin_model, s.fall, q_r)
+    update_recovery_target(s.twin_model, s.fall, q_r)
     for k in range(0, s.fall.velocity.shape[0], 3):
-        shorten(s.fall.velocity[k : k + 3], _MAX_RECOVERY_SPEED)  # the reference may jump
+        limit_length(s.fall.velocity[k : k + 3], _MAX_RECOVERY_SPEED)  # the reference may jump
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
     rate = s.gains.root_rate
     for i in range(3):  # without the bound `root_pull`: the animation may have moved far away
@@ -157,8 +157,8 @@ def _plan_contacts(s: FigureState, support: float) -> bool:
 @njit
 def _bound_residual(s: FigureState, support: float) -> bool:
     """Saturate the residual at its bounds, which scale with the support; returns whether it exceeded them."""
-    force = shorten(s.wrench[:3], support * s.gains.force_bound * s.weight)
-    moment = shorten(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
+    force = limit_length(s.wrench[:3], support * s.gains.force_bound * s.weight)
+    moment = limit_length(s.wrench[3:], support * s.gains.moment_bound * s.weight * s.stature)
     return force or moment
 
 

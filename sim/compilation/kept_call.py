@@ -19,7 +19,7 @@ from sim.compilation.compiled import entry_point
 _ADDRESS, _NUMBER = types.uintp, types.int64
 
 
-class KeptCall:
+class BoundCall:
     """A compiled function bound to stored arguments.
 
     Parameters

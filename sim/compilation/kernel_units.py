@@ -15,7 +15,7 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers
 from controllers.haptic_map.map_stages import MAP_ARGUMENTS, kernels_of, linked
-from controllers.kernel_call import add_keeper, address_of
+from controllers.kernel_call import add_kernel_listener, address_of
 from controllers.state import IntArray
 from controllers.walking.walking import follow_hand
 from sim.compilation.compiled import keep_on_disk
@@ -39,28 +39,28 @@ def linked_walkers(walkers: Walkers) -> Walkers:
     return walkers.linked(_kernel_address(follow_hand, LAW_ARGUMENTS)) if len(walkers.feeds) else walkers
 
 
-def is_kept(kernel: Callable[..., None]) -> bool:
+def is_cacheable(kernel: Callable[..., None]) -> bool:
     """Whether a kernel is cached on disk as a unit: not if it is a closure over a user-defined function."""
     return not getattr(kernel, "py_func").__closure__  # noqa: B009 - a dispatcher
 
 
-@add_keeper
+@add_kernel_listener
 def _cache_kernel(kernel: Any, arguments: tuple[Any, ...]) -> None:
-    if arguments in (LAW_ARGUMENTS, MAP_ARGUMENTS) and is_kept(kernel):
+    if arguments in (LAW_ARGUMENTS, MAP_ARGUMENTS) and is_cacheable(kernel):
         keep_on_disk(kernel)
 
 
 def units_of_map(stages: IntArray) -> tuple[Unit, ...]:
     """Compilation units that the stages of maps need, except those of user-defined functions."""
     kernels = dict.fromkeys(kernels_of(stages))
-    return tuple(Unit.of(kernel, *MAP_ARGUMENTS) for kernel in kernels if is_kept(kernel))
+    return tuple(Unit.of(kernel, *MAP_ARGUMENTS) for kernel in kernels if is_cacheable(kernel))
 
 
 def units_of_laws(program: Program) -> tuple[Unit, ...]:
     """Compilation units of the laws of a field and of its walkers, except those of user-defined functions."""
     walker = (follow_hand,) if program.walker_feeds else ()
-    return tuple(Unit.of(kernel, *LAW_ARGUMENTS) for kernel in (*program.kernels, *walker) if is_kept(kernel))
+    return tuple(Unit.of(kernel, *LAW_ARGUMENTS) for kernel in (*program.kernels, *walker) if is_cacheable(kernel))
 
 
 def _kernel_address(kernel: Callable[..., None], arguments: tuple[Any, ...]) -> int:
-    return Unit.of(kernel, *arguments).address() if is_kept(kernel) else address_of(kernel, arguments)
+    return Unit.of(kernel, *arguments).address() if is_cacheable(kernel) else address_of(kernel, arguments)

@@ -22,7 +22,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 Call = tuple[Callable[..., object], tuple[Any, ...]]
 
 
-def side_by_side(
+def run_in_workers(
     calls: Sequence[Call], done: Callable[[int], None] = lambda number: None, first: Callable[[], None] | None = None
 ) -> None:
     """Make calls in parallel for their side effects, such as filling a cache. Failures are ignored.

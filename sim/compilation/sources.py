@@ -23,7 +23,7 @@ _PACKAGES = ("models", "controllers", "sim", "experiments")
 _LIBRARIES = ("casadi", "mujoco", "numba", "numpy", "scipy")
 
 
-def kept_folder(module: str) -> Path:
+def results_folder(module: str) -> Path:
     """Cache folder for results computed by a module of the project; it changes with the code that they depend on."""
     return cache_folder() / sources_hash(module)[:16]
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from sim.compilation.side_by_side import side_by_side
+from sim.compilation.side_by_side import run_in_workers
 from sim.compilation.unit_key import reached_functions
 from sim.compilation.units import Unit, unit_function
 
@@ -31,7 +31,7 @@ def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda u
     if not missing:
         return
     calls = [(_load_unit, (unit,)) for unit in missing]
-    side_by_side(calls, lambda number: done(missing[number]), _compile_common_functions if len(missing) > 1 else None)
+    run_in_workers(calls, lambda number: done(missing[number]), _compile_common_functions if len(missing) > 1 else None)
 
 
 def _function_count(unit: Unit) -> int:

@@ -82,12 +82,12 @@ def link_device(device: DeviceState) -> None:
         device.link()
 
 
-def ticks_of(device: DeviceState) -> int | None:
+def available_ticks(device: DeviceState) -> int | None:
     """Number of ticks that a device can deliver; None if unlimited."""
     return len(device.rows) if isinstance(device, ReplayedHand) else None
 
 
-def known_start(device: DeviceState) -> HandState | None:
+def first_reading(device: DeviceState) -> HandState | None:
     """First reading of a device if it is known before the run; otherwise None."""
     return HandState.of(device.rows[0]) if isinstance(device, ReplayedHand) else None
 

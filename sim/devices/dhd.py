@@ -17,16 +17,16 @@ from controllers.state import Array, IntArray
 from models.phantom.kinematics import vector_to_device_frame, vector_to_hand_frame
 from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
-from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.driver import READ, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.hid import WATCHDOG
 from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import place_stylus, pose_fault, tip_force
 from sim.errors import SimError
 
-LARGEST = 8.5
+MAX_FORCE = 8.5
 """Largest force that is sent [N]: the stall force of the Premium. Falcon, omega and delta reach 8 to 20 N or more."""
 
 _SIGNS = np.array([-1.0, -1.0, 1.0])  # diagonal of the rotation from the library's axes D to H
@@ -124,7 +124,7 @@ def send_force(dhd: DhdMemory) -> None:
     force = 0.0, 0.0, 0.0
     if enable > 0.0:
         theta = (reading[READING_THETA], reading[READING_THETA + 1], reading[READING_THETA + 2])
-        force = vector_to_hand_frame(tip_force(theta, (torque[0], torque[1], torque[2]), LARGEST))
+        force = vector_to_hand_frame(tip_force(theta, (torque[0], torque[1], torque[2]), MAX_FORCE))
     io[IO_RESULT] = 0.0
     if enable != io[IO_ENABLED]:
         io[IO_RESULT] = call_int(dhd.functions[_ENABLE_FORCE], (np.int32(enable), number))
@@ -160,14 +160,14 @@ class DhdDevice:
         watchdog = library.dhdSetWatchdog(round(WATCHDOG / _WATCHDOG_UNIT), self._id) == 0
         name = (library.dhdGetSystemName(self._id) or b"").decode(errors="replace")
         self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True, own_weight=True)
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         functions = np.array([address_of(getattr(library, name)) for name in _LOOP_FUNCTIONS], np.int64)
         memory = DhdMemory(
             functions, device, np.zeros(12), np.zeros((3, 3)), np.zeros(READING_SIZE), np.zeros(3), np.zeros(IO_SIZE)
         )
         self._memory, self._zero_torque, self._reading_count = memory, np.zeros(3), 0.0
         self._io, self._reading_items, self._telemetry = items(memory.io), items(memory.reading), items(self.telemetry)
-        self._take_pose, self._send_force = KeptCall(take_pose, (memory,)), KeptCall(send_force, (memory,))
+        self._take_pose, self._send_force = BoundCall(take_pose, (memory,)), BoundCall(send_force, (memory,))
 
     def _error_text(self) -> str:
         return (self._dhd.dhdErrorGetLastStr() or b"").decode(errors="replace")

@@ -68,19 +68,19 @@ class DeviceIdentity(NamedTuple):
     own_weight: bool = False
 
 
-TEMPERATURE, ROUND_TRIP, LOST, READ, BAD, JITTER, STALENESS, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7, 8, 9
+TEMPERATURE, ROUND_TRIP, LOST, READ, REFUSED, JITTER, STALENESS, TELEMETRY_SIZE = 0, 3, 4, 5, 6, 7, 8, 9
 """Places in a driver's telemetry: motor temperatures (3) [°C], last round trip [s], numbers of readings lost, read and
 refused, jitter of the arrivals [s] (RFC 3550, section 6.4.1), and latency of the last reading over the least one [s].
 A value that a transport or a device cannot give is NaN."""
 
-DRIFT = 2e-4
+MAX_CLOCK_DRIFT = 2e-4
 """Largest relative drift between two clocks: 100 ppm each, the accuracy of quartz; 0.12 s in ten minutes."""
 
 
-def fresh_telemetry() -> Array:
+def make_telemetry() -> Array:
     """Telemetry of a device before its first reading: nothing read, lost or refused, all else NaN."""
     telemetry = np.full(TELEMETRY_SIZE, np.nan)
-    telemetry[[LOST, READ, BAD]] = 0.0
+    telemetry[[LOST, READ, REFUSED]] = 0.0
     return telemetry
 
 
@@ -89,15 +89,15 @@ def note_arrival(telemetry: Array, clocks: Array, now: float, made: float) -> No
     """Update jitter and staleness for a reading made at `made` by the device's clock, received at `now` [s].
 
     The two clocks have different origins and drift, so only changes of their difference are used, and the least
-    difference rises at the rate of `DRIFT`. `clocks` (3,) holds the last difference of the clocks (NaN before the first
-    reading of a device's clock), the least difference, and when the last reading came.
+    difference rises at the rate of `MAX_CLOCK_DRIFT`. `clocks` (3,) holds the last difference of the clocks (NaN before
+    the first reading of a device's clock), the least difference, and when the last reading came.
     """
     delay = now - made
     if math.isnan(clocks[0]):
         clocks[1], telemetry[JITTER] = delay, 0.0
     else:
         telemetry[JITTER] += (abs(delay - clocks[0]) - telemetry[JITTER]) / 16.0
-        clocks[1] = min(delay, clocks[1] + DRIFT * (now - clocks[2]))
+        clocks[1] = min(delay, clocks[1] + MAX_CLOCK_DRIFT * (now - clocks[2]))
     clocks[0], clocks[2] = delay, now
     telemetry[STALENESS] = delay - clocks[1]
 

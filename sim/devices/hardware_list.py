@@ -103,7 +103,7 @@ def hid_backend() -> Any:
         raise SimError("the package hidapi is not installed; install it with: pip install hidapi") from None
 
 
-def found_devices() -> list[FoundDevice]:
+def list_devices() -> list[FoundDevice]:
     """All devices found on this machine; none is opened and nothing is sent to any of them."""
     found = [_hid_device(row) for row in hid_backend().enumerate()]
     for name, transport, find, product in (
@@ -190,7 +190,7 @@ def open_device(name: str) -> Driver:
     """
     if is_own_device(name):
         return open_own_device(name)
-    check_there(name)
+    check_present(name)
     kind, _, rest = name.partition(":")
     openers: dict[str, Callable[[str], Driver]] = {
         "hid": _open_phantom, "hidraw": _open_phantom, "spacemouse": _open_spacemouse,
@@ -199,7 +199,7 @@ def open_device(name: str) -> Driver:
     return openers[kind](rest)
 
 
-def check_there(name: str) -> None:
+def check_present(name: str) -> None:
     """Check that a name denotes a device that is present, or whose library is installed, without opening it.
 
     Raises
@@ -221,14 +221,14 @@ def check_there(name: str) -> None:
 
 
 def _describe_devices() -> str:
-    names = [device.name for device in found_devices() if device.name]
+    names = [device.name for device in list_devices() if device.name]
     kinds = "expected hid[:SERIAL], hidraw:PATH, spacemouse[:PATH], hdapi[:NAME], dhd or FILE.py:CLASS"
     return f"{kinds}; found here: {', '.join(names) if names else 'none'}"
 
 
 def _single_device(which: str, kind: str, name: str) -> FoundDevice:
     """The device of a kind by serial number or path, or the only one if `which` is empty; `name` is for messages."""
-    connected = found_devices()
+    connected = list_devices()
     for device in connected:
         if which and which in (device.serial, device.path) and device.kind != kind:
             raise SimError(f"{which} is {device.product or 'a device'}, no {kind}: {device.note}")

@@ -19,10 +19,10 @@ import numpy as np
 from controllers.safety.faults import Fault
 from controllers.state import Array
 from sim.compilation.c_function import address_of
-from sim.compilation.kept_call import KeptCall, keep_arguments
+from sim.compilation.kept_call import BoundCall, keep_arguments
 from sim.compilation.memory_access import items
 from sim.compilation.python_clock import clock_for_c
-from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.hdapi_frame import (
     FUNCTIONS,
     IO_CODE,
@@ -129,13 +129,13 @@ class HdapiDevice:
                 f"HDAPI does not open {name or 'the default device'}: {_symbol(code)}; expected a name of the vendor's "
                 "set-up, and the device switched on"
             )
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         self.identity = self._read_identity(self._ensure_calibrated())
         functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
         addresses = [address_of(function) for function in functions]
         memory = HdMemory.fresh(addresses, self._device, self._read_nominal_force(), self.telemetry)
         self._memory, self._io, self._zero_torque = memory, items(memory.io), np.zeros(3)
-        self._take_sample, self._send_force = KeptCall(take_sample, (memory,)), KeptCall(send_force, (memory,))
+        self._take_sample, self._send_force = BoundCall(take_sample, (memory,)), BoundCall(send_force, (memory,))
         for capability in (_MAX_FORCE_CLAMPING, _SOFTWARE_FORCE_LIMIT):
             library.hdEnable(capability)
         # The arguments are never freed: the vendor's thread may use them after this driver is gone.

@@ -22,9 +22,9 @@ from sim.devices.driver import READ
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.virtual_arm import place_stylus, tip_force
 
-SILENCE = 5e-3
+COMMAND_TIMEOUT = 5e-3
 """Watchdog: age of the last command beyond which the callback commands zero force [s]; five of its periods."""
-MOST_ERRORS = 32
+MAX_ERRORS_PER_FRAME = 32
 """Largest number of errors fetched from the library per frame; the rest is fetched after the next frame."""
 
 _DONE, _CONTINUE = np.uint32(0), np.uint32(1)
@@ -40,7 +40,7 @@ FUNCTIONS = (
 """The library's functions in the order of `HdMemory.functions`; the clock's address follows them."""
 _BEGIN, _END, _GET_DOUBLES, _GET_INTEGERS, _SET_DOUBLES, _ENABLE, _DISABLE, _GET_ERROR, _CLOCK = range(9)
 
-N_CLOSING, N_PRESSED, N_ENABLED, N_RAISED, N_HEARD, N_SIZE = range(6)
+N_CLOSING, N_PRESSED, N_ENABLED, N_ERRORS_RAISED, N_ERRORS_TAKEN, N_SIZE = range(6)
 """Places in `HdMemory.numbers`: 1 to end the callback; the buttons, as an int; 1 while the motors are on; number of
 errors that the callback has raised, and number of those that the servo has taken."""
 ERROR_CODE, ERROR_VALUE, ERROR_SIZE = range(3)
@@ -57,7 +57,7 @@ IO_NEW, IO_CODE, IO_FAULT, IO_VALUE, IO_ENABLE, IO_SIZE = range(6)
 value of either; 1 if the motors are to be on."""
 
 
-class Locked(NamedTuple):
+class LockedNumbers(NamedTuple):
     """Numbers shared through a sequence lock.
 
     Attributes
@@ -75,7 +75,7 @@ class Locked(NamedTuple):
     read: Array
 
     @classmethod
-    def fresh(cls, size: int) -> "Locked":
+    def fresh(cls, size: int) -> "LockedNumbers":
         """A lock over `size` zeros."""
         return cls(np.zeros(1, np.int64), *(np.zeros(size) for _ in range(4)))
 
@@ -108,8 +108,8 @@ class HdMemory(NamedTuple):
     device: int
     largest: float
     numbers: IntArray
-    sample: Locked
-    command: Locked
+    sample: LockedNumbers
+    command: LockedNumbers
     force: Array
     heat: Array
     error: Array
@@ -123,8 +123,9 @@ class HdMemory(NamedTuple):
     def fresh(cls, functions: list[int], device: int, largest: float, telemetry: Array) -> "HdMemory":
         """Memory of a device with its motors off, before the first sample."""
         return cls(
-            np.array(functions, np.int64), device, largest, np.zeros(N_SIZE, np.int64), Locked.fresh(SAMPLE_SIZE),
-            Locked.fresh(COMMAND_SIZE), np.zeros(3), np.zeros(6), np.zeros(ERROR_SIZE), np.zeros((3, 3)),
+            np.array(functions, np.int64), device, largest, np.zeros(N_SIZE, np.int64),
+            LockedNumbers.fresh(SAMPLE_SIZE), LockedNumbers.fresh(COMMAND_SIZE),
+            np.zeros(3), np.zeros(6), np.zeros(ERROR_SIZE), np.zeros((3, 3)),
             np.zeros(READING_SIZE), np.zeros(3), np.zeros(IO_SIZE), telemetry,
         )  # fmt: skip
 
@@ -134,9 +135,9 @@ _memory_at: Any = loader(numba.typeof(HdMemory.fresh([], 0, 0.0, np.zeros(1))))
 
 @njit
 def _take_errors(get_error: int) -> int:
-    """Take up to `MOST_ERRORS` errors off the library's error stack; returns the first, 0 if there is none."""
+    """Take up to `MAX_ERRORS_PER_FRAME` errors off the library's error stack; returns the first, 0 if there is none."""
     first = 0
-    for _ in range(MOST_ERRORS):
+    for _ in range(MAX_ERRORS_PER_FRAME):
         code = call_struct_head(get_error)
         if code == 0:
             break
@@ -149,7 +150,7 @@ def _take_errors(get_error: int) -> int:
 def _report_error(hd: HdMemory, code: int) -> None:
     """Store an error for the servo, unless the servo has not taken the previous one yet."""
     numbers, error, sample = hd.numbers, hd.error, hd.sample.written
-    if numbers[N_RAISED] != numbers[N_HEARD]:
+    if numbers[N_ERRORS_RAISED] != numbers[N_ERRORS_TAKEN]:
         return
     error[ERROR_CODE] = error[ERROR_VALUE] = code
     if code == _WARM_MOTORS:
@@ -159,7 +160,7 @@ def _report_error(hd: HdMemory, code: int) -> None:
         x, y, z = sample[SAMPLE_VELOCITY], sample[SAMPLE_VELOCITY + 1], sample[SAMPLE_VELOCITY + 2]
         error[ERROR_VALUE] = np.sqrt(x * x + y * y + z * z) * 1e-3
     barrier()
-    numbers[N_RAISED] += 1
+    numbers[N_ERRORS_RAISED] += 1
 
 
 @entry_point
@@ -180,7 +181,7 @@ def serve_frame(memory: int) -> np.uint32:
     # While a command is being written, the previous one stays in use, until it is older than SILENCE.
     read_whole(hd.command.changes, hd.command.shared, hd.command.whole, command)
     enable = command[COMMAND_ENABLE] > 0.0
-    alive = enable and sample[SAMPLE_CLOCK] - command[COMMAND_CLOCK] <= SILENCE
+    alive = enable and sample[SAMPLE_CLOCK] - command[COMMAND_CLOCK] <= COMMAND_TIMEOUT
     for i in range(3):
         hd.force[i] = command[i] if alive else 0.0
     if enable != (numbers[N_ENABLED] != 0):
@@ -209,11 +210,11 @@ def take_sample(hd: HdMemory) -> None:
     last = reading[READING_SEQUENCE]
     read_whole(hd.sample.changes, hd.sample.shared, hd.sample.whole, sample)
     barrier()
-    if numbers[N_RAISED] != numbers[N_HEARD]:
+    if numbers[N_ERRORS_RAISED] != numbers[N_ERRORS_TAKEN]:
         barrier()
         io[IO_CODE], io[IO_VALUE] = hd.error[ERROR_CODE], hd.error[ERROR_VALUE]
         barrier()
-        numbers[N_HEARD] += 1
+        numbers[N_ERRORS_TAKEN] += 1
         return
     if sample[SAMPLE_NUMBER] == last:  # no new sample, or one that is half written
         return

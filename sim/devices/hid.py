@@ -17,17 +17,17 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol
-from sim.devices.driver import DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_THETA
 from sim.devices.hid_reports import (
     IO_ENABLE,
     IO_FAULT,
-    IO_GIVEN,
     IO_NEW,
     IO_NOW,
+    IO_READING_TIME,
     IO_SIZE,
     IO_VALUE,
     N_BOOT,
@@ -81,19 +81,19 @@ class HidPhantom:
         self._handle, self._clock = handle, clock
         self._transport = transport
         handle.set_nonblocking(True)
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         self._hid = HidMemory.fresh(self.telemetry)
         self._read_identity()
         self._read_calibration()
         self._io, self._reading, self._zero_torque = items(self._hid.io), items(self._hid.reading), np.zeros(3)
-        self._judge, self._make_command = KeptCall(judge_report, (self._hid,)), KeptCall(make_command, (self._hid,))
+        self._judge, self._make_command = BoundCall(judge_report, (self._hid,)), BoundCall(make_command, (self._hid,))
         incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
         incoming = incoming[: protocol.REPORT_SIZE + 1]  # one byte more, so that a report that is too long shows
         self._receive, self._send = _make_transfers(handle, incoming, outgoing)
 
     def _read_feature(self, number: int) -> Any:
         try:
-            return protocol.unsealed(bytes(self._handle.get_feature_report(number, protocol.REPORT_SIZE)), number)
+            return protocol.decode_report(bytes(self._handle.get_feature_report(number, protocol.REPORT_SIZE)), number)
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
 
@@ -145,7 +145,7 @@ class HidPhantom:
         if not self.read(reading, 0.1):
             raise SimError(f"{self._transport}: no reading came within 0.1 s, so there is nothing to calibrate")
         counts = self._hid.zero + reading[READING_THETA:] / self._hid.angle
-        calibration = protocol.blank(protocol.CALIBRATION)
+        calibration = protocol.empty_report(protocol.CALIBRATION)
         calibration["flags"] = protocol.CALIBRATED
         zero = np.rint(counts - np.concatenate([theta, gimbal]) / self._hid.angle)
         if not np.all(np.abs(zero) < 2**31):  # false for NaN too
@@ -155,7 +155,7 @@ class HidPhantom:
         calibration["zero"] = zero
         calibration["counts_per_turn"] = np.rint(2.0 * np.pi / self._hid.angle / protocol.COUNT_UNIT)
         calibration["motor_turns"] = np.rint(self._hid.turns / protocol.TURN_UNIT)
-        self._handle.send_feature_report(protocol.sealed(calibration))
+        self._handle.send_feature_report(protocol.encode_report(calibration))
         self._read_calibration()
         if not np.array_equal(self._hid.zero, calibration["zero"]):
             raise SimError(f"{self._transport} did not keep the calibration; expected its motors to be off")
@@ -176,7 +176,7 @@ class HidPhantom:
             raise DriverFault(Fault.UNPLUGGED) from None
         if has_new:
             np.copyto(reading, self._hid.reading)
-            io[IO_GIVEN] = self._reading[READING_CLOCK]
+            io[IO_READING_TIME] = self._reading[READING_CLOCK]
         return has_new
 
     def _raise_report_fault(self) -> None:

@@ -51,25 +51,25 @@ TORQUE_UNIT, PEAK_UNIT, TEMPERATURE_UNIT, COUNT_UNIT, TURN_UNIT = 1e-6, 1e-5, 0.
 """Units of a torque [N m], a peak torque [N m], a temperature [°C], counts per turn, and motor turns per joint turn."""
 
 
-def blank(report: int) -> npt.NDArray[Any]:
+def empty_report(report: int) -> npt.NDArray[Any]:
     """A report with the given number, all else zero: a record, shape ()."""
     record = np.zeros((), LAYOUTS[report])
     record["report"] = report
     return record
 
 
-def sealed(report: npt.NDArray[Any]) -> bytes:
+def encode_report(report: npt.NDArray[Any]) -> bytes:
     """A report's 64 bytes, including its checksum."""
     body = report.tobytes()[:_CRC_OFFSET]
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 
-def is_sound(report: bytes) -> bool:
+def has_valid_checksum(report: bytes) -> bool:
     """Whether the checksum of a report's 64 bytes is right."""
     return zlib.crc32(report[:_CRC_OFFSET]) == int.from_bytes(report[_CRC_OFFSET:], "little")
 
 
-def unsealed(report: bytes, number: int) -> npt.NDArray[Any]:
+def decode_report(report: bytes, number: int) -> npt.NDArray[Any]:
     """Decode a feature report into its record.
 
     Raises
@@ -77,7 +77,7 @@ def unsealed(report: bytes, number: int) -> npt.NDArray[Any]:
     SimError
         If it has the wrong size, number or checksum.
     """
-    if len(report) != REPORT_SIZE or report[0] != number or not is_sound(report):
+    if len(report) != REPORT_SIZE or report[0] != number or not has_valid_checksum(report):
         raise SimError(
             f"feature report {number} has {len(report)} bytes"
             + (f" and number {report[0]}" if report else "")

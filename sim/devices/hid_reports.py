@@ -15,25 +15,25 @@ from controllers.safety.faults import Fault, first_not_finite
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.devices import hid_protocol as protocol
-from sim.devices.driver import BAD, LOST, READ, ROUND_TRIP, TEMPERATURE, note_arrival
+from sim.devices.driver import LOST, READ, REFUSED, ROUND_TRIP, TEMPERATURE, note_arrival
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 
 WATCHDOG = 0.01
 """Watchdog period: time without a command after which the firmware switches the motors off [s]. Twice the age at which
 a command becomes invalid on the host, so that the firmware acts only where the host failed to."""
-HOTTEST = 100.0
+MAX_TEMPERATURE = 100.0
 """Motor temperature that is a fault [°C]: 25 below what Maxon allows an RE 25's winding."""
 _BAD_CHECKSUM_LIMIT = 3  # consecutive wrong checksums that are a fault; a disturbance spoils one or two
 _SEND_TIME_COUNT = 256  # commands whose time of sending is stored, to measure the round trip
 _STATUS_ERRORS = protocol.STATUS_AMPLIFIER | protocol.STATUS_ENCODER
 
-N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_AGAIN, N_BOOT, N_WATCHDOG, N_SIZE = range(9)
+N_LAST, N_TAKEN, N_BAD, N_SENT, N_ENABLED, N_REENABLE, N_BOOT, N_WATCHDOG, N_SIZE = range(9)
 """Places in `HidMemory.numbers`: number of the last input report (−1: none); readings handed out; reports in a row with
 a wrong checksum; commands sent; number of the command that switched the motors on (−1: off); 1 if the watchdog switched
 them off during a gap, so that one command with motors off must precede the next with motors on; the device's boot
 number; and the watchdog's period [µs]."""
-IO_FAULT, IO_VALUE, IO_NEW, IO_SIZE, IO_NOW, IO_GIVEN, IO_ENABLE = range(7)
-IO_ASKED, IO_ASKED_MADE, IO_LENGTH = 7, 8, 9
+IO_FAULT, IO_VALUE, IO_NEW, IO_SIZE, IO_NOW, IO_READING_TIME, IO_ENABLE = range(7)
+IO_ENABLE_TIME, IO_ENABLE_DEVICE_TIME, IO_LENGTH = 7, 8, 9
 """Places in `HidMemory.io`: fault of a report or a command, with its value; 1 if a report was a new reading; size of
 the report [bytes]; time by the host's clock; time of the last reading handed out by the device's clock [s]; 1 if the
 motors are to be on; both times when the motors were last commanded on."""
@@ -142,7 +142,7 @@ class HidMemory(NamedTuple):
     def fresh(cls, telemetry: Array) -> "HidMemory":
         """Memory before the first report; identity and calibration of the device are not read yet."""
         numbers, io = np.zeros(N_SIZE, np.int64), np.zeros(IO_LENGTH)
-        numbers[[N_LAST, N_ENABLED]], io[IO_GIVEN] = -1, math.nan
+        numbers[[N_LAST, N_ENABLED]], io[IO_READING_TIME] = -1, math.nan
         return cls(
             Words.fresh(), Words.fresh(), numbers, io, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
             np.zeros(3), np.full(_SEND_TIME_COUNT, np.nan), np.zeros(READING_SIZE), telemetry, np.full(3, np.nan),
@@ -161,11 +161,11 @@ def judge_report(hid: HidMemory) -> None:
     io, numbers, telemetry, words = hid.io, hid.numbers, hid.telemetry, hid.incoming
     io[IO_FAULT] = io[IO_NEW] = 0.0
     if io[IO_SIZE] != _SIZE or words.u8[0] != _INPUT:
-        telemetry[BAD] += 1.0
+        telemetry[REFUSED] += 1.0
         _set_fault(io, _REPORT_MALFORMED, io[IO_SIZE])
         return
     if checksum(words.u8) != np.int64(words.u32[_CRC_WORD]):
-        telemetry[BAD] += 1.0
+        telemetry[REFUSED] += 1.0
         numbers[N_BAD] += 1
         if numbers[N_BAD] >= _BAD_CHECKSUM_LIMIT:
             _set_fault(io, _CHECKSUM_WRONG, numbers[N_BAD])
@@ -179,7 +179,7 @@ def judge_report(hid: HidMemory) -> None:
         # A device last used by another program continues that program's numbers; its watchdog may have acted since.
         if answered > numbers[N_SENT]:
             numbers[N_SENT] = answered
-        numbers[N_AGAIN] = 1 if status & _STATUS_WATCHDOG else 0
+        numbers[N_REENABLE] = 1 if status & _STATUS_WATCHDOG else 0
     if not _is_next(hid, np.int64(words.u32[_SEQUENCE])):
         return
     made = np.int64(words.u64[_TIME]) * 1e-6
@@ -210,7 +210,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
     last, telemetry = hid.numbers[N_LAST], hid.telemetry
     ahead = 1 if last < 0 else _sequence_difference(number, last)
     if ahead <= 0:
-        telemetry[BAD] += 1.0
+        telemetry[REFUSED] += 1.0
         if ahead < 0:
             _set_fault(hid.io, _SEQUENCE_BACK, float(-ahead))
         return False
@@ -240,7 +240,7 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
         celsius = hid.telemetry[TEMPERATURE + i]
         if celsius > hottest:  # false for NaN, a motor without a sensor
             hottest = celsius
-    if status & _STATUS_HOT or hottest >= HOTTEST:
+    if status & _STATUS_HOT or hottest >= MAX_TEMPERATURE:
         _set_fault(hid.io, _TOO_HOT, hottest)
 
 
@@ -257,12 +257,12 @@ def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.in
     if enable_command < 0 or status & _STATUS_ENABLED:
         return
     if status & _STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
-        if made - io[IO_GIVEN] > 0.5 * WATCHDOG:
-            hid.numbers[N_AGAIN] = 1
+        if made - io[IO_READING_TIME] > 0.5 * WATCHDOG:
+            hid.numbers[N_REENABLE] = 1
         else:
             _set_fault(io, _DEVICE_REPORTED, _STATUS_WATCHDOG)
         return
-    waited = min(io[IO_NOW] - io[IO_ASKED], made - io[IO_ASKED_MADE])
+    waited = min(io[IO_NOW] - io[IO_ENABLE_TIME], made - io[IO_ENABLE_DEVICE_TIME])
     if waited > WATCHDOG:
         _set_fault(io, _MOTORS_OFF, waited)
 
@@ -277,13 +277,13 @@ def make_command(hid: HidMemory) -> None:
         _set_fault(io, _FORCE_NOT_FINITE, bad_value)
         return
     numbers[N_SENT] += 1
-    enable = io[IO_ENABLE] > 0.0 and numbers[N_AGAIN] == 0
-    numbers[N_AGAIN] = 0
+    enable = io[IO_ENABLE] > 0.0 and numbers[N_REENABLE] == 0
+    numbers[N_REENABLE] = 0
     if not enable:
         numbers[N_ENABLED] = -1
     elif numbers[N_ENABLED] < 0:
         numbers[N_ENABLED] = numbers[N_SENT]
-        io[IO_ASKED], io[IO_ASKED_MADE] = io[IO_NOW], io[IO_GIVEN]
+        io[IO_ENABLE_TIME], io[IO_ENABLE_DEVICE_TIME] = io[IO_NOW], io[IO_READING_TIME]
     words.u8[0], words.u8[1] = _OUTPUT, _ENABLE if enable else 0
     words.u16[_OUT_BOOT], words.u32[_OUT_SEQUENCE] = numbers[N_BOOT], numbers[N_SENT] % 2**32
     words.u32[_OUT_WATCHDOG], words.u32[_OUT_ANSWERS] = numbers[N_WATCHDOG], max(0, numbers[N_LAST])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from controllers.state import Array, IntArray
 from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 
 Bytes = npt.NDArray[np.uint8]
@@ -80,8 +80,8 @@ class HidapiNode:
         Each returns the number of bytes; sending returns −1 on an error, receiving raises OSError.
         """
         read_io, write_io = np.zeros(2), np.zeros(1)
-        call_read = KeptCall(read_report, (self._call_target("hid_read_timeout"), incoming, read_io))
-        call_write = KeptCall(write_report, (self._call_target("hid_write"), outgoing, write_io))
+        call_read = BoundCall(read_report, (self._call_target("hid_read_timeout"), incoming, read_io))
+        call_write = BoundCall(write_report, (self._call_target("hid_write"), outgoing, write_io))
         read_items, write_items = items(read_io), items(write_io)
 
         def receive(timeout_ms: int) -> int:

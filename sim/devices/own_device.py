@@ -20,7 +20,7 @@ import numpy as np
 from controllers.safety.faults import Fault
 from controllers.state import Array
 from models.phantom.kinematics import R_HP
-from sim.devices.driver import READ, DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.driver import READ, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 from sim.devices.virtual_arm import force_at_tip, write_pose
 from sim.errors import SimError
@@ -102,7 +102,7 @@ class TipDriver:
         self.identity = DeviceIdentity(
             name, transport, device.serial, "", forces, device.watchdog, True, own_weight=True
         )  # fmt: skip
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         self._reading, self._force = np.zeros(READING_SIZE), np.zeros(3)
         self._printed: set[str] = set()
 

@@ -15,17 +15,17 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
-from controllers.state import LONGEST_STEP, Array
+from controllers.state import MAX_TIME_STEP, Array
 from models.phantom.kinematics import R_HP, inside_workspace
 from models.phantom.parameters import PREMIUM_1_5
-from sim.devices.driver import BAD, READ, DeviceIdentity, DriverFault, fresh_telemetry
+from sim.devices.driver import READ, REFUSED, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SIZE, READING_SWITCH
 from sim.devices.hid import HidHandle
 from sim.devices.virtual_arm import write_pose
 
-TOP_SPEED, TOP_TURN = 0.15, 1.5
+MAX_SPEED, MAX_ANGULAR_SPEED = 0.15, 1.5
 """Speeds at full deflection of the cap [m/s], [rad/s]: across the workspace of a river in about a second."""
-FULL = 350.0
+FULL_DEFLECTION = 350.0
 """Axis value at full deflection."""
 DEAD_ZONE = 0.03
 """Share of the full deflection below which it is taken as zero: a cap at rest may report this much."""
@@ -60,7 +60,7 @@ class SpaceMouse:
         self._handle, self._clock = handle, clock
         handle.set_nonblocking(True)
         self.identity = DeviceIdentity(name, transport, "", "", False, False, True)
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         self._deflection, self._buttons = np.zeros(6), 0
         self._p_H = np.zeros(3) if start is None else start.copy()
         self._r_HS = np.eye(3)
@@ -85,7 +85,7 @@ class SpaceMouse:
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         now = self._clock()
-        self._move_tip(0.0 if self._last_time is None else min(now - self._last_time, LONGEST_STEP))
+        self._move_tip(0.0 if self._last_time is None else min(now - self._last_time, MAX_TIME_STEP))
         self._last_time = now
         pose = np.zeros(READING_SIZE)
         write_pose(pose, np.array(R_HP).T @ self._p_H, self._r_HS)
@@ -122,19 +122,21 @@ class SpaceMouse:
         elif number == _BUTTONS and len(raw) >= 2:
             self._buttons = raw[1]
         else:
-            self.telemetry[BAD] += number in (_TRANSLATION, _ROTATION, _BUTTONS)
+            self.telemetry[REFUSED] += number in (_TRANSLATION, _ROTATION, _BUTTONS)
             return
         self.telemetry[READ] += 1.0
 
     def _move_tip(self, seconds: float) -> None:
-        step = TOP_SPEED * seconds * (_R_HC @ self._deflection[:3])
+        step = MAX_SPEED * seconds * (_R_HC @ self._deflection[:3])
         for i in range(3):
             moved_tip = self._p_H.copy()
             moved_tip[i] += step[i]
             p_P = np.array(R_HP).T @ moved_tip
             if inside_workspace((p_P[0], p_P[1], p_P[2])):
                 self._p_H = moved_tip
-        turned = Rotation.from_rotvec(TOP_TURN * seconds * (_R_HC @ self._deflection[3:])).as_matrix() @ self._r_HS
+        turned = (
+            Rotation.from_rotvec(MAX_ANGULAR_SPEED * seconds * (_R_HC @ self._deflection[3:])).as_matrix() @ self._r_HS
+        )
         if self._is_within_gimbal_limits(turned):
             self._r_HS = turned
 
@@ -160,5 +162,5 @@ class SpaceMouse:
 
 def _scaled_deflections(axes: npt.NDArray[np.int16]) -> Array:
     """Deflections relative to the full one, −1 … 1, and 0 within the dead zone."""
-    deflection = np.clip(axes / FULL, -1.0, 1.0)
+    deflection = np.clip(axes / FULL_DEFLECTION, -1.0, 1.0)
     return np.where(np.abs(deflection) < DEAD_ZONE, 0.0, deflection)

@@ -32,10 +32,10 @@ from sim.compilation.compiled import entry_point
 from sim.devices.driver import DriverFault
 from sim.devices.exchange import READING_GIMBAL, READING_THETA
 
-WEAKEST = 0.05
+MIN_SINGULAR_VALUE = 0.05
 """Least singular value of J [m/rad] for which torques are converted into a force; it is zero on the turret's axis,
 where J is singular. At θ = 0 it is 0.17."""
-SKEWED = 1e-3
+MAX_ORTHOGONALITY_ERROR = 1e-3
 """Largest entry of R Rᵀ − 1 that is accepted for an orientation; a matrix rounded to four digits passes."""
 
 _NOT_FINITE, _LEFT_WORKSPACE = int(Fault.READING_NOT_FINITE), int(Fault.LEFT_WORKSPACE)
@@ -61,7 +61,7 @@ def quaternion_of(rotation: Array) -> Quat:
 
 
 @njit
-def skewness(matrix: Array) -> float:
+def orthogonality_error(matrix: Array) -> float:
     """Deviation of a matrix (3, 3) from a rotation: the largest entry of R Rᵀ − 1, at least 2 for a reflection."""
     largest = 0.0
     for i in range(3):
@@ -100,8 +100,8 @@ def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
             total += r_HS[i, j]
     if not math.isfinite(total):
         return _NOT_FINITE, total
-    skewed = skewness(r_HS)
-    if not skewed <= SKEWED:
+    skewed = orthogonality_error(r_HS)
+    if not skewed <= MAX_ORTHOGONALITY_ERROR:
         return _NOT_FINITE, skewed
     a, b, c, reachable = inverse_kinematics(p_P)
     theta = (a, b, c)
@@ -148,7 +148,7 @@ def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
     """
     gravity = gravity_torques(theta)
     net = torque[0] - gravity[0], torque[1] - gravity[1], torque[2] - gravity[2]
-    x, y, z = force_from_torques(theta, net, WEAKEST)
+    x, y, z = force_from_torques(theta, net, MIN_SINGULAR_VALUE)
     magnitude = math.sqrt(x * x + y * y + z * z)
     if not math.isfinite(magnitude):
         return 0.0, 0.0, 0.0

@@ -44,9 +44,9 @@ from sim.hardware.servo_process import (
     serve,
 )
 from sim.hardware.shared import Ring, SharedNumbers
-from sim.hardware.undisturbed import start_undisturbed
+from sim.hardware.undisturbed import start_without_sigint
 
-SILENT = 0.2
+SERVO_TIMEOUT = 0.2
 """Time without a tick after which the servo counts as dead [s]."""
 _START_TIMEOUT, _END_TIMEOUT = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
 
@@ -164,9 +164,9 @@ class HardwareRun:
             If the servo could not start; the message says why.
         """
         if self.recorder is not None:
-            start_undisturbed(self.recorder)
+            start_without_sigint(self.recorder)
             self._wait_for_recorder(self.recorder)
-        start_undisturbed(self.servo)
+        start_without_sigint(self.servo)
         self._report_sender.close()
         report = self._receive_report(_START_TIMEOUT)
         if isinstance(report, Ready):
@@ -202,7 +202,7 @@ class HardwareRun:
         tick = float(row["tick"])
         if tick != self._last_tick[0]:
             self._last_tick = tick, now
-        alive = self.servo.is_alive() and now - self._last_tick[1] < SILENT
+        alive = self.servo.is_alive() and now - self._last_tick[1] < SERVO_TIMEOUT
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
         return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._read_recorder_status())
 

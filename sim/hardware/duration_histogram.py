@@ -21,14 +21,14 @@ class Quantiles(NamedTuple):
     times: int
 
 
-class Spread(NamedTuple):
+class DurationHistogram(NamedTuple):
     """A histogram of durations: samples in each bin, shape (`_N_BINS`,), and the longest duration [s], shape (1,)."""
 
     counts: IntArray
     longest: Array
 
     @classmethod
-    def empty(cls) -> "Spread":
+    def empty(cls) -> "DurationHistogram":
         """An empty histogram."""
         return cls(np.zeros(_N_BINS, np.int64), np.zeros(1))
 
@@ -42,7 +42,7 @@ class Spread(NamedTuple):
 
 
 @njit
-def count_time(spread: Spread, seconds: float) -> None:
+def add_duration(spread: DurationHistogram, seconds: float) -> None:
     """Add a duration [s] to the histogram."""
     spread.counts[min(_N_BINS - 1, int(seconds / BIN))] += 1
     spread.longest[0] = max(spread.longest[0], seconds)

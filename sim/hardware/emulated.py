@@ -13,11 +13,11 @@ from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
 from models.world.scene import SceneConfig
 from sim.compilation.compiled import entry_point
-from sim.devices.driver import READ, DeviceIdentity, fresh_telemetry
+from sim.devices.driver import READ, DeviceIdentity, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_SWITCH, READING_THETA
 from sim.errors import SimError
 from sim.users.hand.arm import Arm
-from sim.users.hand.dragged import TREMBLES
+from sim.users.hand.dragged import TREMOR_AMPLITUDE
 from sim.world.linkage import Linkage
 from sim.world.phantom_port import PhantomPort, phantom_port
 from sim.world.plant import Hand, Plant, advance, make_hand, make_plant
@@ -28,7 +28,7 @@ TREMOR_FREQUENCY = 10.0
 
 
 @entry_point
-def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Array) -> None:
+def step_physics(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Array) -> None:
     """Step the physics by the plant's period from time t [s] on; the caller has set the motor commands."""
     advance(plant, port, user, t, False, applied)
 
@@ -36,7 +36,7 @@ def pass_time(plant: Plant, port: PhantomPort, user: Hand, t: float, applied: Ar
 def tremor(seconds: float, period: float) -> Array:
     """Tremor displacement of a hand at rest [m], shape (n, 3), sampled every `period` [s]."""
     t = np.arange(0.0, seconds, period)
-    return TREMBLES * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
+    return TREMOR_AMPLITUDE * np.sin(2.0 * np.pi * TREMOR_FREQUENCY * t[:, None] + np.array([0.0, 2.1, 4.2]))
 
 
 def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
@@ -44,7 +44,7 @@ def emulated_identity(transport: str, calibrated: bool) -> DeviceIdentity:
     return DeviceIdentity("emulated Phantom", transport, "", "", forces=True, watchdog=True, calibrated=calibrated)
 
 
-def steps_late(scene: SceneConfig, delay: float) -> float:
+def delay_in_steps(scene: SceneConfig, delay: float) -> float:
     """Number of physics steps from the start of a period until a torque that is delayed by `delay` [s] acts.
 
     Raises
@@ -80,7 +80,7 @@ class EmulatedPhantom:
     Raises
     ------
     SimError
-        If the start is out of reach, or the delay too long (`steps_late`).
+        If the start is out of reach, or the delay too long (`delay_in_steps`).
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class EmulatedPhantom:
         linkage.into(self.world)
         self.port = phantom_port(self.world.model, self.world.data, scene.servo_period, 150.0)
         self._plant, self._offset = make_plant(self.world), np.array(linkage.offset)
-        steps, delay_steps = self._plant.substeps, steps_late(scene, linkage.delay)
+        steps, delay_steps = self._plant.substeps, delay_in_steps(scene, linkage.delay)
         self._acts_next_period = delay_steps > steps  # the torque begins to act only in the next period
         delay_steps -= steps * self._acts_next_period
         whole_steps, fraction = int(delay_steps), delay_steps % 1.0
@@ -106,7 +106,7 @@ class EmulatedPhantom:
         self._last_torque, self._torque_before_last = np.zeros(3), np.zeros(3)
         self._command_count, self._sequence = 0, 0
         self.torque = np.zeros(3)
-        self.telemetry = fresh_telemetry()
+        self.telemetry = make_telemetry()
         self.identity = emulated_identity("MuJoCo", not any(linkage.offset))
 
     @property
@@ -140,7 +140,7 @@ class EmulatedPhantom:
             span = steps / self._plant.substeps * self._plant.period
             plant = self._plant._replace(substeps=steps, period=span)
             self.world.data.ctrl[self._motor_indices] = new * new_torque + (1.0 - new) * old_torque
-            pass_time(plant, self.port, user, t, self._applied[:steps])
+            step_physics(plant, self.port, user, t, self._applied[:steps])
             t += span
         self._torque_before_last[:], self._last_torque[:] = self._last_torque, self.torque
         self._command_count += 1

@@ -19,12 +19,12 @@ import numpy as np
 from controllers.safety.faults import Fault
 from controllers.state import Array
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
-from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, fresh_telemetry, note_arrival
+from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, make_telemetry, note_arrival
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
-from sim.hardware.packets import BROKEN, NOTHING, monotonic, receive, transmit, wait_for_packet
+from sim.hardware.packets import CLOSED, NOTHING, monotonic, receive, transmit, wait_for_packet
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
 from sim.hardware.undisturbed import parent_id
@@ -116,8 +116,8 @@ class Link(NamedTuple):
     io: Array
 
 
-IO_NEW, IO_SIZE, IO_WENT, IO_SENT, IO_SEQUENCE, IO_WAIT, IO_LENGTH = range(7)
-"""Places in `Link.io`: number of readings taken; size of a malformed packet, or `NOTHING` or `BROKEN`; result of
+IO_NEW, IO_SIZE, IO_SEND_RESULT, IO_SENT, IO_SEQUENCE, IO_WAIT, IO_LENGTH = range(7)
+"""Places in `Link.io`: number of readings taken; size of a malformed packet, or `NOTHING` or `CLOSED`; result of
 sending the last command, and when it was sent [s]; number of the last reading; timeout of a reading [s]."""
 
 
@@ -153,7 +153,7 @@ def take_readings(link: Link) -> None:
 def send_command(link: Link) -> None:
     """Send the command, and store the time."""
     link.io[IO_SENT] = monotonic()
-    link.io[IO_WENT] = transmit(link.descriptor, link.command)
+    link.io[IO_SEND_RESULT] = transmit(link.descriptor, link.command)
 
 
 class EmulatedDriver:
@@ -169,7 +169,7 @@ class EmulatedDriver:
 
     def __init__(self, packets: socket.socket, calibrated: bool = True):
         packets.setblocking(False)
-        self._packets, self.telemetry, io = packets, fresh_telemetry(), np.zeros(IO_LENGTH)
+        self._packets, self.telemetry, io = packets, make_telemetry(), np.zeros(IO_LENGTH)
         self._reading, self._command = np.zeros(READING_SIZE), np.zeros(4)
         link = Link(
             packets.fileno(), np.zeros(_PACKET_SIZE + 1), self._reading, self._command, self.telemetry,
@@ -177,7 +177,7 @@ class EmulatedDriver:
         )  # fmt: skip
         io[IO_SENT] = time.monotonic()
         self._torque, self._io = self._command[:3], items(io)
-        self._take_readings, self._send_command = KeptCall(take_readings, (link,)), KeptCall(send_command, (link,))
+        self._take_readings, self._send_command = BoundCall(take_readings, (link,)), BoundCall(send_command, (link,))
         self.identity = emulated_identity("MuJoCo in another process", calibrated)
 
     def read(self, reading: Array, timeout: float) -> bool:
@@ -185,7 +185,7 @@ class EmulatedDriver:
         io = self._io
         io[IO_WAIT] = timeout
         self._take_readings()
-        if io[IO_SIZE] == BROKEN:
+        if io[IO_SIZE] == CLOSED:
             raise DriverFault(Fault.UNPLUGGED)
         if io[IO_SIZE] != NOTHING:
             raise DriverFault(Fault.REPORT_MALFORMED, io[IO_SIZE])
@@ -197,7 +197,7 @@ class EmulatedDriver:
         np.copyto(self._torque, torque)
         self._command[3] = enable
         self._send_command()
-        if self._io[IO_WENT] == BROKEN:
+        if self._io[IO_SEND_RESULT] == CLOSED:
             raise DriverFault(Fault.UNPLUGGED)
         # If there was no room for the packet, the device is too slow; its readings will then become stale.
 

@@ -8,9 +8,9 @@ from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import HAND_TIME, Array
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import addresses_of, gather, items
-from sim.devices.driver import BAD, JITTER, LOST, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
+from sim.devices.driver import JITTER, LOST, REFUSED, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
 from sim.hardware.gated_tick import MOTOR_HEAT, MOTORS_ON, GateMemory, gated_tick
@@ -101,11 +101,11 @@ class Ticker:
         self._tick_number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
         self._motors, self._faults = items(self.gated.motors), items(self._device.faults)
-        self._run_block = KeptCall(run_block, (parts.servo,), self._tick_number, (1, False, self._ticks, frames))
+        self._run_block = BoundCall(run_block, (parts.servo,), self._tick_number, (1, False, self._ticks, frames))
         gate_arguments = self._device, self.gated, field.limiter, field.tank, field.force
-        self._run_gate = KeptCall(gated_tick, gate_arguments, self._request)
+        self._run_gate = BoundCall(gated_tick, gate_arguments, self._request)
         self._sources = self._row_sources()
-        self._gather_row = KeptCall(gather, (addresses_of(self._sources), self.row))
+        self._gather_row = BoundCall(gather, (addresses_of(self._sources), self.row))
 
     def _row_sources(self) -> list[Array]:
         """Views of the arrays from which a row is gathered, in the order of `CHANNELS`."""
@@ -117,7 +117,7 @@ class Ticker:
             "share": (gated.gate, GATE_SHARE), "heat": (gated.motors, MOTOR_HEAT),
             "sequence": (device.reading, READING_SEQUENCE), "clock": (device.reading, READING_CLOCK),
             "round_trip": (telemetry, ROUND_TRIP), "jitter": (telemetry, JITTER),
-            "staleness": (telemetry, STALENESS), "lost": (telemetry, LOST), "refused": (telemetry, BAD),
+            "staleness": (telemetry, STALENESS), "lost": (telemetry, LOST), "refused": (telemetry, REFUSED),
         }  # fmt: skip
         sources = {name: channel.reshape(-1) for name, channel in tick_channels(self._ticks, 1).items()}
         sources |= {name: array[place : place + 1] for name, (array, place) in single.items()}

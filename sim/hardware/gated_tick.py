@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.safety.arming import pushes
+from controllers.safety.arming import motors_on
 from controllers.safety.energy_tank import book_force
 from controllers.safety.faults import FAULT_CODE, Fault, latch
 from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
 from controllers.safety.limiter import LIMITER_FORCE, THERMAL_TIME
-from controllers.safety.thermal import hold_to_heat
+from controllers.safety.thermal import limit_by_heat
 from controllers.state import HAND_TIME, Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.parameters import PREMIUM_1_5
@@ -19,7 +19,7 @@ from sim.devices.exchange import COMMAND_FAULT, COMMAND_FORCE, COMMAND_TORQUE, E
 from sim.world.encoders import ANGLES, PEAK_TORQUE, motor_torques
 
 CONTINUOUS_TORQUE = PREMIUM_1_5.continuous_torque
-HOT = 0.98
+MAX_HEAT_FRACTION = 0.98
 """Share of a motor's heat capacity above which a fault is latched."""
 
 MOTORS_HOT = int(Fault.MOTORS_HOT)
@@ -95,13 +95,13 @@ def gated_tick(device: Exchange, gated: GateMemory, limiter: Array, tank: Array,
     weight = gravity_torques((memory[ANGLES], memory[ANGLES + 1], memory[ANGLES + 2]))
     for i in range(3):
         torque[i] = min(PEAK_TORQUE[i], max(-PEAK_TORQUE[i], torque[i] - withheld * weight[i]))
-    gated.motors[MOTOR_HEAT] = hold_to_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
+    gated.motors[MOTOR_HEAT] = limit_by_heat(gated.heat, CONTINUOUS_TORQUE, PEAK_TORQUE, gated.cooling, torque)
     if gated.own_weight:
         for i in range(3):
             torque[i] += weight[i]
-    if gated.motors[MOTOR_HEAT] > HOT:
+    if gated.motors[MOTOR_HEAT] > MAX_HEAT_FRACTION:
         latch(faults, MOTORS_HOT, device.hand[HAND_TIME], gated.motors[MOTOR_HEAT])
-    on = pushes(int(gated.gate[GATE_STATE]))
+    on = motors_on(int(gated.gate[GATE_STATE]))
     gated.motors[MOTORS_ON] = 1.0 if on else 0.0
     if faults[FAULT_CODE] != 0.0 or not on:
         force[:] = 0.0

@@ -87,7 +87,7 @@ class Motion(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class IdentificationResult:
     """Result of an identification.
 
     Attributes
@@ -142,7 +142,7 @@ class _Equations(NamedTuple):
     is_first: Mask  # whether a window is the first of a motion, shape (windows,)
 
 
-def identify_linkage(motions: Sequence[Motion]) -> Identified:
+def identify_linkage(motions: Sequence[Motion]) -> IdentificationResult:
     """Estimate the parameters of a linkage.
 
     Parameters
@@ -184,7 +184,7 @@ def identify_linkage(motions: Sequence[Motion]) -> Identified:
     margins = noise + _max_change(equations, sensitivity, scale, _unmodelled_torque(equations, residuals, values[6:9]))
     torque_rms = np.sqrt(np.mean(equations.torque**2, axis=(0, 1, 2)))
     unexplained = [np.mean(residuals[equations.usable[:, i], i] ** 2) / torque_rms[i] ** 2 for i in range(3)]
-    return Identified(values, margins, int(counts.sum()), float(np.sqrt(np.mean(unexplained))))
+    return IdentificationResult(values, margins, int(counts.sum()), float(np.sqrt(np.mean(unexplained))))
 
 
 def _unmodelled_torque(equations: _Equations, residuals: Array, inertia: Array) -> Array:

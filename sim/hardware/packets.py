@@ -23,7 +23,7 @@ _POLLIN = 1 << 32  # POLLIN in `struct pollfd`, after the descriptor
 _CLOCK_MONOTONIC = 1
 NOTHING = -1
 """Result: there is no packet to receive, or no room to send one."""
-BROKEN = 0
+CLOSED = 0
 """Result: the other end is closed."""
 
 
@@ -37,20 +37,20 @@ def monotonic() -> float:
 
 @njit
 def receive(descriptor: int, packet: Array) -> int:
-    """Receive the next packet without waiting; returns its size in bytes, `NOTHING` or `BROKEN`."""
+    """Receive the next packet without waiting; returns its size in bytes, `NOTHING` or `CLOSED`."""
     size = _receive(descriptor, packet.ctypes.data, 8 * len(packet), _MSG_DONTWAIT)
     if size >= 0:
         return size
-    return NOTHING if int32_at(_errno_location()) == _EAGAIN else BROKEN
+    return NOTHING if int32_at(_errno_location()) == _EAGAIN else CLOSED
 
 
 @njit
 def transmit(descriptor: int, packet: Array) -> int:
-    """Send a packet without waiting; returns its size in bytes, `NOTHING` or `BROKEN`."""
+    """Send a packet without waiting; returns its size in bytes, `NOTHING` or `CLOSED`."""
     size = _transmit(descriptor, packet.ctypes.data, 8 * len(packet), _MSG_DONTWAIT)
     if size >= 0:
         return size
-    return NOTHING if int32_at(_errno_location()) == _EAGAIN else BROKEN
+    return NOTHING if int32_at(_errno_location()) == _EAGAIN else CLOSED
 
 
 @njit

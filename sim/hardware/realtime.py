@@ -7,7 +7,7 @@ import time
 
 PRIORITY = 80
 """Priority under SCHED_FIFO, above interrupt threads (50)."""
-SPIN = 150e-6
+BUSY_WAIT_TIME = 150e-6
 """Time before a deadline from which a process busy-waits instead of sleeping [s]."""
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
@@ -44,7 +44,7 @@ def become_realtime() -> list[str]:
 
 
 def wait_until(deadline: float) -> float:
-    """Wait until `time.monotonic` reaches a deadline [s], busy-waiting for the last `SPIN`; returns the lateness [s].
+    """Wait until `time.monotonic` reaches a deadline [s], the last `BUSY_WAIT_TIME` busily; returns the lateness [s].
 
     `time.sleep` is clock_nanosleep with an absolute time on Linux.
     """
@@ -52,5 +52,5 @@ def wait_until(deadline: float) -> float:
         left = deadline - time.monotonic()
         if left <= 0.0:
             return -left
-        if left > SPIN:
-            time.sleep(left - SPIN)
+        if left > BUSY_WAIT_TIME:
+            time.sleep(left - BUSY_WAIT_TIME)

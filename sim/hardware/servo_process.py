@@ -24,12 +24,12 @@ from controllers.safety.faults import Fault
 from controllers.state import Array, IntArray
 from models.errors import ModelError
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.compilation.sequence_lock import read_whole, write_whole
-from sim.devices.driver import BAD, LOST, DeviceIdentity
+from sim.devices.driver import LOST, REFUSED, DeviceIdentity
 from sim.errors import SimError
-from sim.hardware.duration_histogram import Quantiles, Spread, count_time
+from sim.hardware.duration_histogram import DurationHistogram, Quantiles, add_duration
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers, append_row
@@ -160,21 +160,27 @@ def _exit_on_signal(number: int, frame: object) -> None:
 
 
 @entry_point
-def hear_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
+def read_orders(count: IntArray, shared: Array, whole: Array, order: Array, parent: Array) -> None:
     """Read the controls' order (see `read_whole`), and the id of the parent process, shape (1,)."""
     read_whole(count, shared, whole, order)
     parent[0] = _getppid()
 
 
 @entry_point
-def leave_row(
-    row: Array, status_count: IntArray, status: Array, count: IntArray, rows: Array, compute: Spread, lateness: Spread
+def publish_row(
+    row: Array,
+    status_count: IntArray,
+    status: Array,
+    count: IntArray,
+    rows: Array,
+    compute: DurationHistogram,
+    lateness: DurationHistogram,
 ) -> None:
     """Publish a tick's row in status and ring, and count its computing time and lateness."""
     write_whole(status_count, status, row)
     append_row(count, rows, row)
-    count_time(compute, float(row[COMPUTE]))
-    count_time(lateness, float(row[LATENESS]))
+    add_duration(compute, float(row[COMPUTE]))
+    add_duration(lateness, float(row[LATENESS]))
 
 
 class ServoProcess:
@@ -196,11 +202,11 @@ class ServoProcess:
         self._period = ticker.parts.gate.period
         order, parent = np.zeros(ORDER_SIZE), np.zeros(1)
         self._order, self._parent = items(order), items(parent)
-        self._compute, self._lateness = Spread.empty(), Spread.empty()
+        self._compute, self._lateness = DurationHistogram.empty(), DurationHistogram.empty()
         orders, status, rows = channels.orders, channels.status, channels.rows
-        self._read_orders = KeptCall(hear_orders, (orders.count, orders.numbers, orders.whole, order, parent))
+        self._read_orders = BoundCall(read_orders, (orders.count, orders.numbers, orders.whole, order, parent))
         self._rows, shown = rows.numbers, (status.count, status.numbers, rows.count, rows.numbers)
-        self._publish_row = KeptCall(leave_row, (ticker.row, *shown, self._compute, self._lateness))
+        self._publish_row = BoundCall(publish_row, (ticker.row, *shown, self._compute, self._lateness))
         self._ticks = self._missed = 0.0
         self._last_beat_time, self._last_beat, self._last_request = time.monotonic(), -1.0, 0.0
         self._initial_resources = _resource_use()
@@ -212,7 +218,7 @@ class ServoProcess:
         report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
         self._ticker.tick(0)
         self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
-        self._ticker.parts.driver.telemetry[[LOST, BAD]] = 0.0  # losses before the start do not count
+        self._ticker.parts.driver.telemetry[[LOST, REFUSED]] = 0.0  # losses before the start do not count
         self._initial_resources = _resource_use()
         self._reports.send(Ready(self._ticker.parts.driver.identity, self._period, report))
 

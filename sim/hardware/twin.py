@@ -39,7 +39,7 @@ BANDWIDTH = 2.0 * math.pi * 30.0
 """ω of the observer [rad/s]: above a hand's motion, below the noise of the encoders' differences."""
 RESIDUAL_GAIN = 2.0 * math.pi * 10.0
 """K of the momentum observer [1/s]."""
-SLOW = 0.05
+FRICTION_TRANSITION_RATE = 0.05
 """ε, joint rate below which the direction of friction is uncertain [rad/s]."""
 TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "hand_force": (3,)}
 """Tip position predicted for the tick, in H [m], its distance from the measured one [m], and the hand's force in H
@@ -75,7 +75,7 @@ def momentum_residual(
             memory[_INTEGRAL + i] = momentum
             continue
         coriolis = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
-        friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / SLOW)
+        friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / FRICTION_TRANSITION_RATE)
         memory[_INTEGRAL + i] += period * (torque[i] + coriolis - n[i] - friction)
         memory[i] = gain * (momentum - memory[_INTEGRAL + i]) / (1.0 + gain * period)
         memory[_INTEGRAL + i] += period * memory[i]

@@ -7,7 +7,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
 
 
-def start_undisturbed(process: BaseProcess) -> None:
+def start_without_sigint(process: BaseProcess) -> None:
     """Start a process with SIGINT blocked, also during its imports: only its parent ends it."""
     resource_tracker.ensure_running()  # otherwise spawning the first process would start it, and unblock SIGINT
     old_mask = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))

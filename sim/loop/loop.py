@@ -11,7 +11,7 @@ import numpy as np
 
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.state import Array, HandState
-from sim.devices.device import read_device, ticks_of
+from sim.devices.device import available_ticks, read_device
 from sim.errors import SimError
 from sim.loop.channels import configuration_size
 from sim.loop.servo import FrameLog, Servo, TickLog, run_block
@@ -140,7 +140,7 @@ class Loop:
         """
         plant, every = self.servo.plant, self.servo.figure_ticks
         requested = every * round(seconds / (plant.period * every))
-        limit, first = ticks_of(self.servo.device), self._tick
+        limit, first = available_ticks(self.servo.device), self._tick
         if limit is not None and first + requested > limit:
             end, rest = (first + requested) * plant.period, (limit - first) * plant.period
             raise SimError(

@@ -27,9 +27,9 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.map_feed import Maps, feed_maps, unlinked_maps
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers, feed_walkers, fresh_walkers
-from controllers.lent import lend
+from controllers.lent import by_pointer
 from controllers.safety.command import command_force
-from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, renew_tank
+from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, reset_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
 from controllers.state import Array, IntArray
@@ -249,7 +249,7 @@ def run_block(servo: Servo, first: int, n: int, replay: bool, ticks: TickLog, fr
     ticks, frames : TickLog, FrameLog
         Written (or read, see `replay`) row by row.
     """
-    _run_ticks(lend(servo), first, n, replay, lend(ticks), lend(frames))
+    _run_ticks(by_pointer(servo), first, n, replay, by_pointer(ticks), by_pointer(frames))
 
 
 def rearm_servo(servo: Servo) -> None:
@@ -259,4 +259,4 @@ def rearm_servo(servo: Servo) -> None:
     """
     rearm(servo.device.faults)
     renew_limiter(servo.field.limits, servo.field.limiter)
-    renew_tank(servo.field.tank)
+    reset_tank(servo.field.tank)

@@ -16,7 +16,7 @@ _CONSTANT_FIELDS = {"params", "ops", "units", "maps", "feeds", "slots", "limits"
 """Fields of a servo's parts that are constant during a run."""
 
 
-class KeptState(NamedTuple):
+class Snapshot(NamedTuple):
     """State of a servo and its world between two ticks.
 
     Attributes
@@ -48,14 +48,14 @@ def state_arrays(part: object) -> Iterator[Array]:
             yield from state_arrays(value)
 
 
-def kept_state(servo: Servo, world: World, tick: int) -> KeptState:
+def take_snapshot(servo: Servo, world: World, tick: int) -> Snapshot:
     """Save the state before tick number `tick`."""
     data = mujoco.MjData(world.model)
     mujoco.mj_copyData(data, world.model, world.data)
-    return KeptState(tick, data, tuple(array.copy() for array in state_arrays(servo)))
+    return Snapshot(tick, data, tuple(array.copy() for array in state_arrays(servo)))
 
 
-def put_back(servo: Servo, world: World, state: KeptState) -> None:
+def restore_snapshot(servo: Servo, world: World, state: Snapshot) -> None:
     """Restore a saved state of servo and world."""
     for array, saved in zip(state_arrays(servo), state.arrays, strict=True):
         array[...] = saved

@@ -25,7 +25,7 @@ from llvmlite.binding import get_host_cpu_name
 
 from controllers.state import Array
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
-from sim.recording.unclosed import held
+from sim.recording.unclosed import lock_for_writing
 
 CHUNK_SECONDS = 0.5  # [s] of rows that a killed run can lose, besides rows not yet appended
 # A write is copied page by page, and a kill between two pages corrupts what crosses their boundary. With this page size
@@ -222,7 +222,7 @@ class Recorder:
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
         self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
-        self._lock = held(path)
+        self._lock = lock_for_writing(path)
         self._streams = {name: _Stream(group, group_of(self._file, name), path) for name, group in groups.items()}
 
     def append(self, group: str, blocks: Mapping[str, Array]) -> None:

@@ -73,7 +73,7 @@ def superblock(path: Path) -> Superblock | None:
     return Superblock(head, struct.unpack_from("<Q", head, _END_OFFSET)[0], size)
 
 
-def held(path: Path) -> int:
+def lock_for_writing(path: Path) -> int:
     """Mark a file as being written, by a shared lock; returns the descriptor, which holds the lock until closed."""
     descriptor = os.open(path, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_SH)

@@ -11,8 +11,8 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import CompiledMap, evaluate_map, kernels_of
 from controllers.haptic_map.river_clips import river_clips_map
 from controllers.kernel_call import call_as_given
-from controllers.legs.limbs import LIMB
-from controllers.lent import Lent, lend
+from controllers.legs.limbs import LIMB_SIZE
+from controllers.lent import Lent, by_pointer
 from controllers.state import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import linked_stages
@@ -70,7 +70,7 @@ def update_unit(reference: CompiledReference) -> Unit:
 @entry_point
 def _reference_along(update: int, reference: CompiledReference, points: Array, traces: Array, poses: Array) -> None:
     for i in range(points.shape[0]):
-        call_as_given(update, (lend(reference), points[i], traces[i]))
+        call_as_given(update, (by_pointer(reference), points[i], traces[i]))
         poses[i] = reference.pose
 
 
@@ -172,7 +172,7 @@ def make_reference(
     """
     check_reference(period, bandwidth, blend)
     nq, nv = figure_model.nq, figure_model.nv
-    transition = make_transition(nq, nv, blend, np.zeros((0, LIMB)) if limbs is None else limbs)
+    transition = make_transition(nq, nv, blend, np.zeros((0, LIMB_SIZE)) if limbs is None else limbs)
     return _initial_reference(compiled, (nq, nv), transition)._replace(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
         clip_seconds=clip_seconds,
@@ -182,7 +182,7 @@ def make_reference(
 def no_reference() -> CompiledReference:
     """The empty reference of a servo without a figure."""
     empty_map = CompiledMap(np.zeros((0, 3), dtype=np.int64), np.zeros(0), np.zeros(0))
-    return _initial_reference(empty_map, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB))))
+    return _initial_reference(empty_map, (0, 0), make_transition(0, 0, 0.0, np.zeros((0, LIMB_SIZE))))
 
 
 def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition: Transition) -> CompiledReference:

@@ -5,10 +5,10 @@ from typing import NamedTuple
 from numba import njit
 
 from controllers.haptic_map.map_stages import evaluate_map
-from controllers.haptic_map.river_memory import even_pace
+from controllers.haptic_map.river_memory import absorb_excess_pace
 from controllers.state import Array, IntArray
-from sim.reference.stylus_filter import turned_on
-from sim.reference.transition import Transition, carry_on
+from sim.reference.stylus_filter import extrapolate_orientation
+from sim.reference.transition import Transition, apply_transition_to_pose
 
 
 class CompiledReference(NamedTuple):
@@ -77,7 +77,7 @@ class CompiledReference(NamedTuple):
 
 
 @njit
-def look_around(reference: CompiledReference, hand: Array) -> None:
+def evaluate_around(reference: CompiledReference, hand: Array) -> None:
     """Poses of the map along a motion of the stylus: now, one period before and after; `memory` is that of now."""
     _evaluate_now(reference, hand)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
@@ -86,12 +86,14 @@ def look_around(reference: CompiledReference, hand: Array) -> None:
 
 
 @njit
-def look_around_in_river(reference: CompiledReference, params: Array, hand: Array) -> None:
-    """As `look_around`, for a map whose rivers play one clip each, at an even pace (`even_pace`)."""
+def evaluate_around_in_river(reference: CompiledReference, params: Array, hand: Array) -> None:
+    """As `evaluate_around`, for a map whose rivers play one clip each, at an even pace (`absorb_excess_pace`)."""
     _evaluate_now(reference, hand)
     for sign, pose in ((-1.0, reference.before), (1.0, reference.after)):
         _extrapolate_stylus(reference, hand, sign)
-        even_pace(params, reference.memory, reference.scratch_x, sign * reference.period, reference.scratch_memory)
+        absorb_excess_pace(
+            params, reference.memory, reference.scratch_x, sign * reference.period, reference.scratch_memory
+        )
         evaluate_map(reference.stages, reference.params, reference.scratch_x, reference.scratch_memory, pose)
 
 
@@ -109,7 +111,7 @@ def _extrapolate_stylus(reference: CompiledReference, hand: Array, sign: float) 
     period, x = reference.period, reference.scratch_x
     for i in range(3):
         x[i] = hand[0, i] + sign * period * hand[1, i] + 0.5 * period**2 * hand[2, i]
-    x[3], x[4], x[5], x[6] = turned_on(reference.orientation, reference.turning, sign * period)
+    x[3], x[4], x[5], x[6] = extrapolate_orientation(reference.orientation, reference.turning, sign * period)
     reference.scratch_memory[:] = reference.memory
 
 
@@ -127,10 +129,10 @@ def follow_trail(reference: CompiledReference) -> None:
 
 
 @njit
-def carry(reference: CompiledReference) -> None:
+def apply_transition(reference: CompiledReference) -> None:
     """Apply the transition in progress to the poses now, before and after."""
     if reference.transition.since[0] >= reference.transition.lasts[0]:
         return
-    carry_on(reference.transition, 0.0, reference.pose)
-    carry_on(reference.transition, -reference.period, reference.before)
-    carry_on(reference.transition, reference.period, reference.after)
+    apply_transition_to_pose(reference.transition, 0.0, reference.pose)
+    apply_transition_to_pose(reference.transition, -reference.period, reference.before)
+    apply_transition_to_pose(reference.transition, reference.period, reference.after)

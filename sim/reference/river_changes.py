@@ -11,27 +11,27 @@ from numba import njit
 
 from controllers.haptic_map.map_stages import evaluate_map
 from controllers.haptic_map.river_memory import (
-    AHEAD,
-    PHASE,
-    SHOWN,
-    ahead_in_clip,
+    CLIP_PHASE,
+    HAND_PHASE,
+    LEAD,
+    advance_clip,
     begin_change,
     change_clip,
-    go_on,
+    follow_other_curve,
     heading_between,
     hold_at_gate,
     phase_rate,
     place_clip,
+    resume_clip,
     stop_clip,
-    take_course,
 )
 from controllers.legs.footsteps import limb_end
-from controllers.motion.inertialization import stopping_way
+from controllers.motion.inertialization import stopping_distance
 from controllers.rotations import rotate
 from controllers.state import Array
-from sim.reference.reference_state import CompiledReference, carry, look_around_in_river
+from sim.reference.reference_state import CompiledReference, apply_transition, evaluate_around_in_river
 from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
-from sim.reference.waiting import leaps, stands, waits_no_longer
+from sim.reference.waiting import has_waited_enough, is_leaping, is_standing
 
 
 @njit
@@ -39,7 +39,7 @@ def _evaluate_ahead(reference: CompiledReference, params: Array, seconds: float,
     """Pose of the playing clip `seconds` from now, if it goes on at its river's own pace."""
     memory = reference.scratch_memory
     memory[:] = reference.memory
-    ahead_in_clip(params, memory, seconds)
+    advance_clip(params, memory, seconds)
     evaluate_map(reference.stages, reference.params, reference.scratch_x, memory, pose)
 
 
@@ -53,8 +53,8 @@ def _place_clip(reference: CompiledReference, pose: Array, x: float, y: float, t
 @njit
 def _store_shown_poses(reference: CompiledReference, params: Array) -> None:
     """Store the poses that are shown now, one period before and one period after."""
-    look_around_in_river(reference, params, reference.going)
-    carry(reference)
+    evaluate_around_in_river(reference, params, reference.going)
+    apply_transition(reference)
     shown = reference.transition.shown
     shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
 
@@ -89,24 +89,24 @@ def _begin_transition(reference: CompiledReference, params: Array) -> None:
     """
     transition, period = reference.transition, reference.period
     shown, change = transition.shown, transition.change
-    look_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.going)
     pose = reference.pose
     _place_clip(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
-    look_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
     set_duration(transition, 0.0, period)
     stopping, seconds = np.zeros(3), transition.lasts[0]
     for i in range(2):
-        stopping[i] = stopping_way(change[1, i], change[2, i], seconds)
+        stopping[i] = stopping_distance(change[1, i], change[2, i], seconds)
     _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
     _, _, twist = rotate(pose[3], pose[4], pose[5], pose[6], change[2, 3], change[2, 4], change[2, 5])
-    stopping[2] = stopping_way(spin, twist, seconds)
+    stopping[2] = stopping_distance(spin, twist, seconds)
     _place_clip(reference, pose, pose[0] + stopping[0], pose[1] + stopping[1], stopping[2])
     _, moved = _place_on_pivot(reference, params)
     set_duration(transition, moved, period)
     # A longer change ends at another pose: place the motion again by where the foot stands then.
     foot, _ = _place_on_pivot(reference, params)
-    look_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.going)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
     _evaluate_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
     plan_depth(transition)
@@ -122,18 +122,18 @@ def may_change(reference: CompiledReference, params: Array, river: float, phase:
     """
     transition, memory, x = reference.transition, reference.scratch_memory, reference.scratch_x
     size = reference.size
-    if waits_no_longer(transition):
+    if has_waited_enough(transition):
         return True
-    if not stands(transition, reference.pose, reference.velocity[2], size):
+    if not is_standing(transition, reference.pose, reference.velocity[2], size):
         return False
     for k in range(3):
         memory[:] = reference.memory
         change_clip(params, memory, river, phase)
         # Evaluated first to get the phase from the hand's position: the field may time the curve unlike the clip.
         evaluate_map(reference.stages, reference.params, x, memory, transition.ahead[0])
-        ahead_in_clip(params, memory, 0.5 * k * transition.seconds)
+        advance_clip(params, memory, 0.5 * k * transition.seconds)
         evaluate_map(reference.stages, reference.params, x, memory, transition.ahead[0])
-        if leaps(transition, transition.ahead[0], size):
+        if is_leaping(transition, transition.ahead[0], size):
             return False
     return True
 
@@ -147,20 +147,22 @@ def change_river(reference: CompiledReference, params: Array, river: float, phas
 
 
 @njit
-def go_along(reference: CompiledReference, params: Array, river: float) -> None:
+def switch_timing_curve(reference: CompiledReference, params: Array, river: float) -> None:
     """Take the hand's phase from another river's curve, while the clip goes on to the gate of a precomputed change."""
     scratch, x = reference.scratch_memory, reference.scratch_x
     x[:3], x[3:] = reference.hand[0], reference.orientation
     scratch[:] = reference.memory
     evaluate_map(reference.stages, reference.params, x, scratch, reference.before)
-    take_course(params, reference.memory, river, x, scratch[SHOWN])
+    follow_other_curve(params, reference.memory, river, x, scratch[CLIP_PHASE])
 
 
 @njit
-def go_through(reference: CompiledReference, params: Array, change: int, river: float, gate: float) -> None:
+def begin_precomputed_change(
+    reference: CompiledReference, params: Array, change: int, river: float, gate: float
+) -> None:
     """Begin a precomputed change to another river's clip at a gate [s] just passed, where the old clip was then."""
     memory, scratch, x = reference.memory, reference.scratch_memory, reference.scratch_x
-    old, new, phase, ahead = reference.before, reference.after, memory[PHASE], memory[AHEAD]
+    old, new, phase, ahead = reference.before, reference.after, memory[HAND_PHASE], memory[LEAD]
     scratch[:] = memory
     hold_at_gate(params, scratch, gate)
     evaluate_map(reference.stages, reference.params, x, scratch, old)
@@ -168,7 +170,7 @@ def go_through(reference: CompiledReference, params: Array, change: int, river: 
     hold_at_gate(params, memory, gate)
     evaluate_map(reference.stages, reference.params, x, memory, new)
     _place_clip(reference, new, old[0], old[1], heading_between(new, old))
-    go_on(memory, phase, ahead)
+    resume_clip(memory, phase, ahead)
 
 
 @njit
@@ -178,5 +180,5 @@ def stop(reference: CompiledReference, params: Array) -> None:
     _store_shown_poses(reference, params)
     # Clamped to the clip's own pace: a hand thrown along the curve, or against it, would overshoot.
     pace = min(max(phase_rate(params, memory, reference.scratch_memory, period), -1.0), 1.0)
-    stop_clip(params, memory, stopping_way(pace, 0.0, reference.transition.seconds))
+    stop_clip(params, memory, stopping_distance(pace, 0.0, reference.transition.seconds))
     _begin_transition(reference, params)

@@ -22,7 +22,7 @@ from numba import njit, types
 from controllers.easing import cubic_step
 from controllers.legs.floor import SOFTNESS
 from controllers.legs.footsteps import lever, limb_end
-from controllers.legs.limbs import LIMB
+from controllers.legs.limbs import LIMB_SIZE
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
@@ -66,11 +66,11 @@ def clearance(limbs: Array, ends: Array, pose: Array, size: float) -> float:
     lowest = math.inf
     for n in range(limbs.shape[0]):
         limb_end(limbs[n], pose, ends[n])
-        for k in range(LIMB, limbs.shape[1], 3):
+        for k in range(LIMB_SIZE, limbs.shape[1], 3):
             lowest = min(lowest, _height(limbs[n], ends[n], k, size))
     total = 0.0
     for n in range(limbs.shape[0]):
-        for k in range(LIMB, limbs.shape[1], 3):
+        for k in range(LIMB_SIZE, limbs.shape[1], 3):
             total += math.exp((lowest - _height(limbs[n], ends[n], k, size)) / SOFTNESS)
     return lowest - SOFTNESS * math.log(total)
 

@@ -55,7 +55,7 @@ def turn_rate(v: Array, a: Array) -> float:
 
 
 @njit
-def turned_on(q: Array, turning: Array, s: float) -> tuple[float, float, float, float]:
+def extrapolate_orientation(q: Array, turning: Array, s: float) -> tuple[float, float, float, float]:
     """Orientation R·exp(s ω + ½ s² α) after s seconds of the turning (ω, α), shape (2, 3), in the frame of R."""
     a, b = s, 0.5 * s**2
     turn = exponential(
@@ -86,7 +86,7 @@ def smooth_turn(q: Array, turning: Array, measured: Array, smoothing: float, per
         θ and T [s].
     """
     g, h, k = filter_gains(smoothing, period)
-    w, x, y, z = turned_on(q, turning, period)
+    w, x, y, z = extrapolate_orientation(q, turning, period)
     sign = 1.0 if w * measured[0] + x * measured[1] + y * measured[2] + z * measured[3] >= 0.0 else -1.0
     # Difference first, then product: for nearly equal quaternions this loses no digits, for equal ones it is exactly 0.
     rest = (sign * measured[0] - w, sign * measured[1] - x, sign * measured[2] - y, sign * measured[3] - z)

@@ -11,13 +11,13 @@ import numpy as np
 from numba import njit
 
 from controllers.easing import smooth_step
-from controllers.legs.footsteps import STEP, THROW, limb_end, pivot, plan_steps, step_end
-from controllers.legs.stepping_limbs import put_limb, shortfall
-from controllers.motion.inertialization import add_offset, offset_left
+from controllers.legs.footsteps import MAX_CONTINUED_ACCELERATION, STEP, limb_end, pivot, plan_steps, step_end
+from controllers.legs.stepping_limbs import required_root_lowering, solve_stepping_limb
+from controllers.motion.inertialization import add_offset, decaying_offset
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
 
-DWELL = 0.04  # [s] dwell time of a river before its clip plays: unfiltered noise changes the river every 23 ms
+DWELL_TIME = 0.04  # [s] dwell time of a river before its clip plays: unfiltered noise changes the river every 23 ms
 _N_ROOT = 6  # components of a tangent for the root
 # [m/s²] largest vertical acceleration of the root due to the offset: a leg in single support bears little more. With
 # half the value the worst of 40 changes of walk, run and squat dance slides 3.6 cm instead of 2.9; with twice, joint
@@ -102,12 +102,12 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
 
 
 @njit
-def dwells(transition: Transition, river: float, period: float) -> bool:
+def dwell_complete(transition: Transition, river: float, period: float) -> bool:
     """Whether the river that would take over (−1: none) has been active for the dwell time; call it every period."""
     rival = transition.rival
     rival[1] = rival[1] + period if river == rival[0] else 0.0
     rival[0] = river
-    return river >= 0.0 and rival[1] >= DWELL
+    return river >= 0.0 and rival[1] >= DWELL_TIME
 
 
 @njit
@@ -140,13 +140,13 @@ def _apply_offset(transition: Transition, at: float, pose: Array) -> None:
     for n in range(transition.limbs.shape[0]):
         limb_end(transition.limbs[n], pose, ends[n])
         step_end(transition.limbs[n], transition.steps[n], at, lasts, ends[n])
-    offset_left(transition.change[:, :_N_ROOT], lasts, at, transition.offset[:_N_ROOT])
-    offset_left(transition.change[:, _N_ROOT:], lasts, at, transition.offset[_N_ROOT:], _MAX_JOINT_OVERSHOOT)
+    decaying_offset(transition.change[:, :_N_ROOT], lasts, at, transition.offset[:_N_ROOT])
+    decaying_offset(transition.change[:, _N_ROOT:], lasts, at, transition.offset[_N_ROOT:], _MAX_JOINT_OVERSHOOT)
     add_offset(pose, transition.offset)
 
 
 @njit
-def carry_on(transition: Transition, s: float, pose: Array) -> None:
+def apply_transition_to_pose(transition: Transition, s: float, pose: Array) -> None:
     """Turn a pose of the new motion, s seconds from now, into the shown pose: add offset, root depth and steps."""
     since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends
     if since >= lasts:
@@ -157,7 +157,7 @@ def carry_on(transition: Transition, s: float, pose: Array) -> None:
     pose[2] -= 64.0 * (x * (1.0 - x)) ** 3 * transition.depth[0]
     share = smooth_step(min(at, lasts - at) / _LEG_FADE_TIME) ** 2
     for n in range(limbs.shape[0]):
-        put_limb(limbs[n], pose, ends[n], share)
+        solve_stepping_limb(limbs[n], pose, ends[n], share)
 
 
 @njit
@@ -173,7 +173,7 @@ def plan_depth(transition: Transition) -> None:
     depth = 0.0
     _apply_offset(transition, 0.5 * lasts, pose)
     for n in range(limbs.shape[0]):
-        depth = max(depth, shortfall(limbs[n], transition.steps[n], pose, ends[n]))
+        depth = max(depth, required_root_lowering(limbs[n], transition.steps[n], pose, ends[n]))
     transition.depth[0] = min(depth, _MAX_DEPTH_ACCELERATION * lasts**2)
 
 
@@ -196,7 +196,9 @@ def note_change(
         transition.change[1, i] = 0.5 * (next_[i] - previous[i]) / period
         transition.change[2, i] = (next_[i] - 2.0 * current[i] + previous[i]) / period**2
     for i in range(3):
-        transition.change[2, i] = min(max(transition.change[2, i], -THROW), THROW)
+        transition.change[2, i] = min(
+            max(transition.change[2, i], -MAX_CONTINUED_ACCELERATION), MAX_CONTINUED_ACCELERATION
+        )
     if transition.seconds > 0.0:
         plan_steps(
             transition.limbs, transition.steps, transition.shown, pose, period, transition.lasts[0], second,

@@ -9,22 +9,28 @@ from numba import njit
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER
 from controllers.haptic_map.map_stages import first_params
 from controllers.haptic_map.river_memory import (
-    COURSE,
+    TIMING_RIVER,
+    absorb_excess_pace,
     changing,
-    even_pace,
     gate_passed,
-    knows_change,
-    lets_go,
+    has_left_river,
+    has_transition,
+    is_taken_over,
     phase_rate,
-    takes_over,
 )
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
-from sim.reference.reference_state import CompiledReference, carry, follow_trail, look_around, look_around_in_river
-from sim.reference.river_changes import change_river, go_along, go_through, may_change, stop
+from sim.reference.reference_state import (
+    CompiledReference,
+    apply_transition,
+    evaluate_around,
+    evaluate_around_in_river,
+    follow_trail,
+)
+from sim.reference.river_changes import begin_precomputed_change, change_river, may_change, stop, switch_timing_curve
 from sim.reference.settling import approach, lower_to_floor, lowering_goal
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
-from sim.reference.transition import dwells
+from sim.reference.transition import dwell_complete
 
 
 @njit
@@ -46,7 +52,7 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         `controllers.fields.algebra.instructions`). Not read; see `update_river_reference`.
     """
     _filter_stylus(reference, stylus)
-    look_around(reference, reference.hand)
+    evaluate_around(reference, reference.hand)
     _differentiate(reference)
 
 
@@ -57,10 +63,10 @@ def update_river_reference(reference: CompiledReference, stylus: Array, trace: A
     reference.transition.since[0] += reference.period
     follow_trail(reference)
     params = first_params(reference.stages, reference.params)
-    even_pace(params, reference.memory, reference.hand[0], reference.period, reference.memory)
+    absorb_excess_pace(params, reference.memory, reference.hand[0], reference.period, reference.memory)
     _change_clip_if_due(reference, params, trace)
-    look_around_in_river(reference, params, reference.hand)
-    carry(reference)
+    evaluate_around_in_river(reference, params, reference.hand)
+    apply_transition(reference)
     _differentiate(reference)
 
 
@@ -87,18 +93,20 @@ def _change_clip_if_due(reference: CompiledReference, params: Array, trace: Arra
     period, river = reference.period, trace[TRACE_RIVER]
     # Rivers with blended weights may become active in turn many times a second: a change must end before the next.
     is_complete = reference.transition.since[0] >= reference.transition.lasts[0]
-    has_dwelt = dwells(reference.transition, river if takes_over(params, reference.memory, river) else -1.0, period)
+    has_dwelt = dwell_complete(
+        reference.transition, river if is_taken_over(params, reference.memory, river) else -1.0, period
+    )
     change, gate = gate_passed(params, reference.memory, river)
-    if has_dwelt and is_complete and knows_change(params, reference.memory, river):
-        if river != reference.memory[COURSE]:
-            go_along(reference, params, river)
+    if has_dwelt and is_complete and has_transition(params, reference.memory, river):
+        if river != reference.memory[TIMING_RIVER]:
+            switch_timing_curve(reference, params, river)
         elif change >= 0 and not changing(reference.memory):
-            go_through(reference, params, change, river, gate)
+            begin_precomputed_change(reference, params, change, river, gate)
     elif has_dwelt and is_complete and may_change(reference, params, river, trace[TRACE_PHASE]):
         change_river(reference, params, river, trace[TRACE_PHASE])
     else:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
-        if lets_go(params, reference.memory, river, reference.going, rate):
+        if has_left_river(params, reference.memory, river, reference.going, rate):
             stop(reference, params)
 
 

@@ -13,7 +13,7 @@ def typical_peak(channel: Channel) -> float:
     return float(np.percentile(np.linalg.norm(channel[:: max(1, len(channel) // 20000)], axis=1), 99.5))
 
 
-def followed(roots: Array, fps: float) -> Array:
+def view_offsets(roots: Array, fps: float) -> Array:
     """Horizontal offset of the view (n, 2) [m]: the path of a travelling root smoothed over 1 s; else zero.
 
     Parameters

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from controllers.state import Array
-from sim.viewer.live_stage import drawn_at, taken_at
+from sim.viewer.live_stage import drawn_at, workspace_position
 from sim.viewer.palette import USER, rgb
 
 Dragged = Callable[[Any, Array, bool], None]
@@ -53,6 +53,6 @@ class HandBall:
             self.dragged = event.phase != "end"
             if self.dragged:
                 self._ball.position = position
-            callback(event, taken_at(position), shift)
+            callback(event, workspace_position(position), shift)
 
         return listen

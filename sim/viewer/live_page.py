@@ -10,7 +10,7 @@ import viser
 
 from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 from sim.viewer.views import VIEWS, add_view_buttons, open_with
 
 _MAX_FPS = 30.0  # frames sent per second
@@ -49,7 +49,7 @@ class LivePage:
         open_with(self._server, lambda client: VIEWS["both"])
         self._last_shown_time = 0.0
 
-    def show(self, shown: Shown, notes: Sequence[str] = ()) -> None:
+    def show(self, shown: Moment, notes: Sequence[str] = ()) -> None:
         """Show a moment with notes below its time, at most 30 times a second; other calls are ignored."""
         now = time.monotonic()
         if now - self._last_shown_time < 1 / _MAX_FPS:

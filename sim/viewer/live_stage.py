@@ -17,8 +17,8 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course
 from sim.viewer.framing import TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
-from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, coarser, tube
-from sim.viewer.shown import Shown
+from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, simplify_shapes, tube
+from sim.viewer.shown import Moment
 
 MAGNIFICATION = 8.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # [m] where the hand frame's origin is drawn, out of the figure's reach
@@ -28,7 +28,7 @@ LEAST_ARROW = 0.02  # [m] drawn length below which a force is hidden
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force of a field slice
 FOLLOWS = 0.5  # [s] time constant with which the view follows a travelling figure
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] mesh resolution, coarse enough for a phone
-LEAPS = 3.0  # [m] distance from the view's position beyond which a figure was relocated, not moved
+RELOCATION_DISTANCE = 3.0  # [m] distance from the view's position beyond which a figure was relocated, not moved
 
 
 def drawn_at(p_H: Array) -> Array:
@@ -36,7 +36,7 @@ def drawn_at(p_H: Array) -> Array:
     return PHANTOM_AT + MAGNIFICATION * p_H
 
 
-def taken_at(position: Array) -> Array:
+def workspace_position(position: Array) -> Array:
     """Point of the hand frame that is drawn at a scene position [m], shapes (..., 3)."""
     return (position - PHANTOM_AT) / MAGNIFICATION
 
@@ -66,9 +66,11 @@ class LiveStage:
         shapes = body_shapes(model, body_prefix(model))
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, "figure/root")
         self._root = int(model.jnt_qposadr[joint]) if joint >= 0 else -1
-        self._phantom = Actor(scene, "phantom", coarser(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION)
-        self._figure = Actor(scene, "figure", coarser(shapes, FIGURE_CELL), 1.0)
-        self._ghost = Actor(scene, "ghost", coarser(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
+        self._phantom = Actor(
+            scene, "phantom", simplify_shapes(body_shapes(model, "phantom/"), PHANTOM_CELL), MAGNIFICATION
+        )
+        self._figure = Actor(scene, "figure", simplify_shapes(shapes, FIGURE_CELL), 1.0)
+        self._ghost = Actor(scene, "ghost", simplify_shapes(shapes, GHOST_CELL) if ghost else [], 1.0, GHOST)
         self._view_offset, self._start, self._t = np.zeros(2), np.full(2, np.nan), 0.0
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
@@ -127,7 +129,7 @@ class LiveStage:
         at = drawn_at(points)
         self._slice.points = np.stack([at, at + scale * forces], axis=1).astype(np.float32)
 
-    def show(self, shown: Shown) -> None:
+    def show(self, shown: Moment) -> None:
         """Draw one moment."""
         data, shift = self._data, self._update_view_offset(shown.t, shown.qpos)
         data.qpos[:] = shown.qpos
@@ -157,7 +159,7 @@ class LiveStage:
         if np.isnan(self._start[0]):
             self._start = position.copy()
         displacement = position - self._start
-        if np.linalg.norm(displacement - self._view_offset) > LEAPS:
+        if np.linalg.norm(displacement - self._view_offset) > RELOCATION_DISTANCE:
             self._view_offset = displacement if np.linalg.norm(displacement) > TRAVEL else np.zeros(2)
         elif np.linalg.norm(displacement) > TRAVEL or np.any(self._view_offset != 0.0):
             share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)

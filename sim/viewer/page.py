@@ -2,13 +2,13 @@
 
 from typing import Protocol
 
-from sim.viewer.shown import Shown
+from sim.viewer.shown import Moment
 
 
 class Page(Protocol):
     """A page that shows a run in progress."""
 
-    def show(self, shown: Shown) -> None:
+    def show(self, shown: Moment) -> None:
         """Show a moment of the run."""
         ...
 
@@ -20,7 +20,7 @@ class Page(Protocol):
 class NullPage:
     """The page of a run without display."""
 
-    def show(self, shown: Shown) -> None:
+    def show(self, shown: Moment) -> None:
         """Do nothing."""
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course, courses
-from sim.viewer.framing import followed, typical_peak
+from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
 
@@ -176,7 +176,7 @@ class _Stage:
         ticks, frames = (np.minimum(np.searchsorted(t, replay_times), len(t) - 1) for t in (times, frame_times))
         has_reference = "reference" in self._frames
         roots = np.array([self._frames["reference"][int(k)][:2] for k in frames]) if has_reference else np.zeros((n, 2))
-        shifts = followed(roots, FPS) if self._is_travelling else np.zeros_like(roots)
+        shifts = view_offsets(roots, FPS) if self._is_travelling else np.zeros_like(roots)
         piece = int(TRAIL_SECONDS * FPS)
         for i in range(n):
             self._show(int(ticks[i]), int(frames[i]), shifts[i])

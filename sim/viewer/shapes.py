@@ -76,7 +76,7 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
     return shapes
 
 
-def coarser(shapes: list[Shape], cell: float) -> list[Shape]:
+def simplify_shapes(shapes: list[Shape], cell: float) -> list[Shape]:
     """Simplify shapes by vertex clustering: vertices in a cubic cell merge at their mean (Rossignac & Borrel 1993).
 
     Parameters

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from controllers.state import Array
 
 
-class Shown(NamedTuple):
+class Moment(NamedTuple):
     """The displayed state of a run at one time.
 
     Attributes

@@ -10,7 +10,7 @@ from controllers.state import Array
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT, GHOST_CELL, drawn_at
 from sim.viewer.palette import RIVERS, rgb
-from sim.viewer.shapes import body_shapes, coarser, tube
+from sim.viewer.shapes import body_shapes, simplify_shapes, tube
 
 COLORS = RIVERS[1:]
 _MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path
@@ -32,7 +32,7 @@ class TakeGhosts:
     def __init__(self, scene: viser.SceneApi, model: mujoco.MjModel, paths: Mapping[str, Array]):
         self._model, self._data = model, mujoco.MjData(model)
         self._root = int(model.jnt_qposadr[model.joint("figure/root").id])
-        shapes = coarser(body_shapes(model, "figure/"), GHOST_CELL)
+        shapes = simplify_shapes(body_shapes(model, "figure/"), GHOST_CELL)
         self._ghosts: list[Actor] = []
         self._paths: list[viser.MeshHandle] = []
         for k, (path, color) in enumerate(zip(paths.values(), COLORS, strict=False)):

@@ -51,7 +51,7 @@ moves 2.5 mm in this time, which changes the force of a spring of 500 N/m by 1.3
 operating system do not justify a loss of force."""
 
 
-def top_rates() -> Angles:
+def max_rates() -> Angles:
     r"""Upper bound of the joint rates [rad/s]: from stop to stop under the peak torque, :math:`\sqrt{2 P \Delta/M}`.
 
     Friction is neglected and the least inertia M_ii of the workspace is used, so no motor reaches these rates; nor does
@@ -68,7 +68,7 @@ def top_rates() -> Angles:
     return first, second, third
 
 
-TOP_RATES = top_rates()
+TOP_RATES = max_rates()
 
 
 def plausibility(period: float, silent: float = SILENT_PERIODS) -> Plausibility:

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.kernel_call import call_as_given
-from controllers.lent import lend
+from controllers.lent import by_pointer
 from controllers.safety.faults import is_silent
 from controllers.state import Array
 from models.phantom.spec import MOTOR_JOINTS
@@ -14,7 +14,7 @@ from models.world.scene import PHANTOM
 from sim.compilation.native import mj_step
 from sim.users.hand.arm import Arm, CompiledArm, hand_force
 from sim.users.hand.fingers import turning_moment
-from sim.users.person.person_state import PersonState, nobody
+from sim.users.person.person_state import PersonState, no_person
 from sim.world.phantom_port import PhantomPort, let_go, true_motion, true_turn
 from sim.world.world import World
 
@@ -82,7 +82,7 @@ def make_plant(world: World) -> Plant:
 def make_hand(user: Arm | PersonState) -> Hand:
     """A simulated user before its first tick."""
     linear = np.zeros(3), np.zeros(3), np.zeros((3, 3)), np.zeros(3)
-    arm, person = (user, nobody()) if isinstance(user, Arm) else (Arm(), user)
+    arm, person = (user, no_person()) if isinstance(user, Arm) else (Arm(), user)
     return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3), person)
 
 
@@ -119,7 +119,7 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
                 when, dt = t + i * plant.period / plant.substeps, plant.period / plant.substeps
                 call_as_given(
                     hand.person.units[0],
-                    (lend(hand.person), when, dt, i, hand.p, hand.v, hand.force, hand.arm.switch),
+                    (by_pointer(hand.person), when, dt, i, hand.p, hand.v, hand.force, hand.arm.switch),
                 )
             else:
                 hand_force(hand.arm, t + i * plant.period / plant.substeps, hand.p, hand.v, hand.force)

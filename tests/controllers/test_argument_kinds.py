@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.checks import check_kinds, numbers_of, of_kind, takes
+from controllers.checks import check_callable, check_field_types, check_kind, numbers_of
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.weights import Weight
@@ -59,7 +59,7 @@ def test_message_states_the_expected_kind() -> None:
         (tuple[float, ...], "a sequence, each a number"), (Sequence[Trajectory], "a sequence, each Trajectory"),
     ):  # fmt: skip
         with pytest.raises(ParameterError, match=f"^curve is 'x'; expected {expected}$"):
-            of_kind("curve", "x", kind)
+            check_kind("curve", "x", kind)
     with pytest.raises(ParameterError, match=r"^pace is 'runs'; expected one of clock, wait$"):
         Bunny(CIRCLE, 1.0, 1.0, 0.1, pace="runs")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ParameterError, match=r"^the other field is 3; expected Law$"):
@@ -68,21 +68,21 @@ def test_message_states_the_expected_kind() -> None:
 
 def test_takes_accepts_only_functions_with_the_expected_arguments() -> None:
     for right in (lambda t, p: t, lambda t, p, s=1: t, lambda *those: those, max, print):
-        takes("cost", right, "t", "p")
+        check_callable("cost", right, "t", "p")
     for wrong, shown in (
         (3, "3"), (None, "None"), (lambda t: t, "<lambda>(t)"), (lambda t, p, s: t, "<lambda>(t, p, s)"),
         (len, "len(obj, /)"),
     ):  # fmt: skip
         with pytest.raises(ParameterError, match=f"^{re.escape(f'cost is {shown}; expected a function of t, p')}$"):
-            takes("cost", wrong, "t", "p")
+            check_callable("cost", wrong, "t", "p")
 
 
 def test_numpy_scalars_are_accepted_as_numbers() -> None:
     for number in (np.float64(3.0), np.float32(3.0), np.int64(3), 3):
-        check_kinds(Follow(CIRCLE, number, number, epsilon=number, parallel=np.bool_(True)))  # pyright: ignore
-    of_kind("direction", np.zeros(3), tuple[float, float, float])
+        check_field_types(Follow(CIRCLE, number, number, epsilon=number, parallel=np.bool_(True)))  # pyright: ignore
+    check_kind("direction", np.zeros(3), tuple[float, float, float])
     with pytest.raises(ParameterError, match=r"^direction is .*; expected 3 numbers$"):
-        of_kind("direction", (0.0, 1.0), tuple[float, float, float])
+        check_kind("direction", (0.0, 1.0), tuple[float, float, float])
 
 
 @pytest.mark.parametrize("wrong", [None, "x", ["1", "2"], [[0.0], [1.0, 2.0]], {}, [True, False], [None, 1.0]])

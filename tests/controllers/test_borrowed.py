@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.borrowed import borrowed
+from controllers.borrowed import without_refcount
 from controllers.state import Array
 from tests.controllers.array_lifetimes import ArrayLifetimes
 
@@ -28,7 +28,7 @@ def _fill(these: Parts, n: int) -> None:
 
 @njit
 def _filled(these: Parts, n: int) -> None:
-    _fill(borrowed(these), n)
+    _fill(without_refcount(these), n)
 
 
 FILLED = [[1.0, 2.0], [1.0, 2.5], [1.0, 3.0]]

@@ -8,7 +8,7 @@ from numba import njit, typeof, types
 from numba.core.errors import TypingError
 
 from controllers.kernel_call import address_of, call_as_given
-from controllers.lent import Lent, lend
+from controllers.lent import Lent, by_pointer
 from controllers.state import Array
 from tests.controllers.array_lifetimes import ArrayLifetimes
 
@@ -54,17 +54,17 @@ def _fill(these: Parts, n: int) -> None:
 
 @njit
 def _lend_on(these: Parts, n: int) -> None:
-    _fill(lend(these), n)
+    _fill(by_pointer(these), n)
 
 
 @njit
 def _filled(these: Parts, n: int) -> None:
-    _lend_on(lend(these), n)
+    _lend_on(by_pointer(these), n)
 
 
 @njit
 def _by_address(kernel: int, these: Parts) -> None:
-    call_as_given(kernel, (lend(these), 3))
+    call_as_given(kernel, (by_pointer(these), 3))
 
 
 @njit
@@ -74,12 +74,12 @@ def _difference(same: Any) -> float:
 
 @njit
 def _lent_difference(same: Any) -> float:
-    return _difference(lend(same))
+    return _difference(by_pointer(same))
 
 
 @njit
 def _misspelt(these: Any) -> float:
-    return lend(these).missing
+    return by_pointer(these).missing
 
 
 FILLED = [[1.0, 2.0], [1.0, 2.5], [1.0, 3.0]]

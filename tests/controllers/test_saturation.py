@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.saturation import clamped, saturate_vector
+from controllers.saturation import saturate_vector, soft_clamp
 from tests.derivatives import central_differences
 
 LOW, HIGH, MARGIN = -0.02, 0.03, 0.004
@@ -11,15 +11,15 @@ LOW, HIGH, MARGIN = -0.02, 0.03, 0.004
 
 def test_clamped_is_the_identity_inside_and_constant_beyond_the_margin():
     for x in np.linspace(LOW, HIGH, 11):
-        assert clamped(x, LOW, HIGH, MARGIN) == (x, 1.0)
+        assert soft_clamp(x, LOW, HIGH, MARGIN) == (x, 1.0)
     for beyond in (MARGIN, 2.0 * MARGIN, 1e6):
-        assert clamped(HIGH + beyond, LOW, HIGH, MARGIN) == pytest.approx((HIGH + 0.5 * MARGIN, 0.0), abs=1e-15)
-        assert clamped(LOW - beyond, LOW, HIGH, MARGIN) == pytest.approx((LOW - 0.5 * MARGIN, 0.0), abs=1e-15)
+        assert soft_clamp(HIGH + beyond, LOW, HIGH, MARGIN) == pytest.approx((HIGH + 0.5 * MARGIN, 0.0), abs=1e-15)
+        assert soft_clamp(LOW - beyond, LOW, HIGH, MARGIN) == pytest.approx((LOW - 0.5 * MARGIN, 0.0), abs=1e-15)
 
 
 def test_clamped_value_and_two_derivatives_are_continuous():
     x = np.linspace(LOW - 2.0 * MARGIN, HIGH + 2.0 * MARGIN, 40001)
-    value, slope = np.array([clamped(at, LOW, HIGH, MARGIN) for at in x]).T
+    value, slope = np.array([soft_clamp(at, LOW, HIGH, MARGIN) for at in x]).T
     step = x[1] - x[0]
     np.testing.assert_allclose(np.diff(value) / step, 0.5 * (slope[1:] + slope[:-1]), atol=1e-5)
     # The second derivative is at most 1.5/m and its slope 6/m², which bounds the difference of neighbours.

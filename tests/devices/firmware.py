@@ -40,7 +40,7 @@ class Motors(ctypes.Structure):
 
 
 def identity(watchdog_max_us: int = 100_000) -> np.ndarray:
-    record = protocol.blank(protocol.IDENTITY)
+    record = protocol.empty_report(protocol.IDENTITY)
     record["capabilities"] = (
         protocol.HAS_MOTORS | protocol.HAS_WATCHDOG | protocol.HAS_TEMPERATURE | protocol.HAS_GIMBAL
     )
@@ -51,7 +51,7 @@ def identity(watchdog_max_us: int = 100_000) -> np.ndarray:
 
 
 def calibration() -> np.ndarray:
-    record = protocol.blank(protocol.CALIBRATION)
+    record = protocol.empty_report(protocol.CALIBRATION)
     record["flags"] = protocol.CALIBRATED
     turns = [*PREMIUM_1_5.capstan, 1.0, 1.0, 1.0]
     counts = [PREMIUM_1_5.encoder_counts] * 3 + [PREMIUM_1_5.gimbal_counts] * 3
@@ -62,10 +62,10 @@ def calibration() -> np.ndarray:
 
 
 def output_report(enable: bool, boot: int, sequence: int, watchdog_us: int, torque: list[int], answers: int) -> bytes:
-    record = protocol.blank(protocol.OUTPUT)
+    record = protocol.empty_report(protocol.OUTPUT)
     record["flags"], record["boot"], record["sequence"] = protocol.ENABLE if enable else 0, boot, sequence
     record["watchdog_us"], record["torque"], record["answers"] = watchdog_us, torque, answers
-    return protocol.sealed(record)
+    return protocol.encode_report(record)
 
 
 class Firmware:

@@ -16,7 +16,7 @@ from experiments.cli import main
 from experiments.files.device_files import calibration_from, read_device_file
 from experiments.hardware.permit import check_device
 from sim.devices.driver import READ, ROUND_TRIP, DriverFault
-from sim.devices.hardware_list import found_devices, hid_backend, open_device
+from sim.devices.hardware_list import hid_backend, list_devices, open_device
 from sim.errors import SimError
 from tests.devices.follow import LAP, device_follow, gated_follow, rms, simulated_follow
 from tests.devices.hidraw_node import SPACEMOUSE_DESCRIPTOR, HidrawNode, NodeFirmware, NodeRig
@@ -35,7 +35,7 @@ def phantom(tmp_path):
 def test_hidapi_from_the_wheel_lists_the_node(phantom) -> None:
     (row,) = hid_backend().enumerate()
     assert (row["vendor_id"], row["usage_page"], row["usage"]) == (0x16C0, 0xFF48, 0x56)
-    (device,) = found_devices()
+    (device,) = list_devices()
     assert (device.name, device.bus, device.kind, device.usable) == ("hid:HVF-0001", "usb", "phantom", True)
 
 
@@ -111,7 +111,7 @@ def test_follow_through_hidapi_firmware_and_gate_matches_simulation_within_1_mm(
 
 def test_touch_is_listed_but_refused_and_nothing_is_sent_to_it(capsys) -> None:
     node = HidrawNode(MOUSE, 0x2988, 0x0304, "Touch", "T-1")
-    (device,) = found_devices()
+    (device,) = list_devices()
     assert (device.kind, device.name) == ("touch", "")
     for name in ("hid:T-1", "hidraw:/dev/hidraw0"):
         with pytest.raises(SimError, match="its HID reports are not public, so nothing is sent to it; use hdapi"):
@@ -124,7 +124,7 @@ def test_touch_is_listed_but_refused_and_nothing_is_sent_to_it(capsys) -> None:
 
 def test_unrelated_hid_device_is_listed_but_refused() -> None:
     node = HidrawNode(MOUSE, 0x046D, 0xC077, "Mouse")
-    (device,) = found_devices()
+    (device,) = list_devices()
     assert (device.kind, device.name, device.product) == ("other", "", "Mouse")
     with pytest.raises(SimError, match="is Mouse, no phantom: not a device that moves a stylus"):
         open_device("hidraw:/dev/hidraw0")
@@ -146,7 +146,7 @@ def test_spacemouse_opens_by_kind_and_by_node() -> None:
 
 def test_node_without_permission_is_reported_with_its_udev_rule(phantom, capsys, monkeypatch) -> None:
     monkeypatch.setattr("sim.devices.hardware_list.os.access", lambda path, mode: path != "/dev/hidraw0")
-    (device,) = found_devices()
+    (device,) = list_devices()
     assert not device.usable
     assert main(["hardware", "doctor", "--seconds", "0.05"]) == 0
     output = capsys.readouterr().out

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, joint_torques, stylus_orientation, vector_to_device_frame
-from sim.devices.dhd import DHD, LARGEST, DhdDevice
+from sim.devices.dhd import DHD, MAX_FORCE, DhdDevice
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
 from tests.devices.mocks import mock_dhd, motor_force
@@ -59,7 +59,7 @@ def test_forces_are_in_newtons_in_device_axes_and_limited(dhd) -> None:
         f_H = rng.normal(0.0, 3.0, 3)
         torque = np.add(joint_torques(theta, vector_to_device_frame(tuple(f_H))), gravity_torques(theta))
         device.write(torque, True)
-        wanted = f_H * min(1.0, LARGEST / np.linalg.norm(f_H))
+        wanted = f_H * min(1.0, MAX_FORCE / np.linalg.norm(f_H))
         np.testing.assert_allclose(motor_force(dhd), wanted * [-1.0, -1.0, 1.0], atol=1e-12)
     device.write(torque, False)
     assert not motor_force(dhd).any()

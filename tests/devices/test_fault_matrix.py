@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controllers.safety.faults import Fault
-from sim.devices.driver import BAD, LOST, READ
+from sim.devices.driver import LOST, READ, REFUSED
 from tests.devices.fault_table import PAGE, PROCESS_FAULTS, row_of
 from tests.devices.wire_faults import INJECTIONS, REPEATS, Injection, Wire, inject, with_wrong_bits
 
@@ -74,7 +74,7 @@ def test_occasional_bus_errors_are_counted_without_loss_of_force(firmware_librar
     assert wire.ticker.fault is None
     assert wire.firmware.joint_torque.any()
     telemetry = wire.driver.telemetry
-    assert telemetry[BAD] == kinds.count("twice") + kinds.count("bits")
+    assert telemetry[REFUSED] == kinds.count("twice") + kinds.count("bits")
     assert telemetry[LOST] >= kinds.count("lost")
     assert telemetry[READ] > 250
     assert wire.recording_complete(tmp_path / "run.h5")

@@ -7,7 +7,7 @@ from controllers.safety.faults import Fault
 from models.phantom.kinematics import ENCODER_STEP, GIMBAL_STEP
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices import hid_protocol as protocol
-from sim.devices.driver import BAD, JITTER, LOST, READ, ROUND_TRIP, STALENESS, TEMPERATURE, DriverFault
+from sim.devices.driver import JITTER, LOST, READ, REFUSED, ROUND_TRIP, STALENESS, TEMPERATURE, DriverFault
 from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle, output_report
@@ -101,7 +101,7 @@ def test_telemetry_measures_temperature_round_trip_loss_jitter_and_staleness(dri
         driver.read(reading, 0.0)
         clock.now -= 0.3e-3 if k % 2 else 0.0
     np.testing.assert_array_equal(telemetry[TEMPERATURE : TEMPERATURE + 3], [30.0, 31.0, np.nan])
-    assert (telemetry[READ], telemetry[BAD], telemetry[LOST]) == (192.0, 0.0, 10.0)
+    assert (telemetry[READ], telemetry[REFUSED], telemetry[LOST]) == (192.0, 0.0, 10.0)
     assert telemetry[ROUND_TRIP] == pytest.approx(0.3e-3, abs=1e-6)  # 1.3 ms, of which the device held it for 1 ms
     assert telemetry[JITTER] == pytest.approx(0.3e-3, rel=0.2)
     assert telemetry[STALENESS] == pytest.approx(0.3e-3, abs=1e-6)
@@ -225,7 +225,7 @@ def with_altered_feature(number: int, **changed):
             record = np.frombuffer(raw, protocol.LAYOUTS[number]).copy()[0:1].reshape(())
             for name, value in changed.items():
                 record[name] = value
-            return list(protocol.sealed(record))
+            return list(protocol.encode_report(record))
 
         handle.get_feature_report = telemetry
 

@@ -9,7 +9,7 @@ import pytest
 
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices import hid_protocol as protocol
-from sim.devices.driver import fresh_telemetry
+from sim.devices.driver import make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SWITCH, READING_THETA
 from sim.devices.hid_reports import (
     IO_ENABLE,
@@ -46,12 +46,12 @@ def c_output(folder: Path, lines: list[str]) -> str:
 def output(
     firmware: Firmware, sequence: int, enable: bool = True, watchdog_us: int = 5000, torque: int = 20_000, **other
 ):
-    report = protocol.blank(protocol.OUTPUT)
+    report = protocol.empty_report(protocol.OUTPUT)
     report["flags"], report["boot"], report["sequence"] = int(enable), firmware.boot, sequence
     report["watchdog_us"], report["torque"] = watchdog_us, torque
     for name, value in other.items():
         report[name] = value
-    return protocol.sealed(report)
+    return protocol.encode_report(report)
 
 
 def test_c_and_python_field_offsets_and_sizes_agree(tmp_path: Path) -> None:
@@ -71,14 +71,14 @@ def test_c_and_python_field_offsets_and_sizes_agree(tmp_path: Path) -> None:
 
 
 def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
-    rng, hid = np.random.default_rng(9), HidMemory.fresh(fresh_telemetry())
+    rng, hid = np.random.default_rng(9), HidMemory.fresh(make_telemetry())
     hid.angle[:], hid.turns[:], hid.peak[:] = 1.0, 1.0, 1e4
     for k in range(100):
         record = np.frombuffer(rng.bytes(64), protocol.INPUT_REPORT)[0].copy()
         record["report"], record["status"], record["sequence"] = protocol.INPUT, 0, k + 1
         record["temperature"] = rng.integers(1 - 2**15, 9000, 3)
         hid.numbers[N_BOOT], hid.numbers[N_LAST] = record["boot"], k
-        hid.incoming.u8[:64], hid.io[IO_SIZE] = np.frombuffer(protocol.sealed(record), np.uint8), 64
+        hid.incoming.u8[:64], hid.io[IO_SIZE] = np.frombuffer(protocol.encode_report(record), np.uint8), 64
         judge_report(hid)
         assert (hid.io[IO_FAULT], hid.io[IO_NEW]) == (0.0, 1.0)
         np.testing.assert_array_equal(hid.reading[READING_THETA:], record["encoder"])
@@ -90,7 +90,7 @@ def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
         hid.torque[:], hid.io[IO_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
         hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
         make_command(hid)
-        report = protocol.unsealed(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
+        report = protocol.decode_report(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
         assert report["torque"].tolist() == torque.tolist()
         fields = ("flags", "boot", "sequence", "watchdog_us", "answers")
         assert [int(report[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]
@@ -125,20 +125,20 @@ def test_c_and_python_checksums_are_ethernet_crc_32(firmware: Firmware) -> None:
 
 def test_reports_with_four_wrong_bits_or_a_32_bit_burst_are_rejected() -> None:
     rng = np.random.default_rng(2)
-    report = protocol.sealed(protocol.blank(protocol.INPUT))
+    report = protocol.encode_report(protocol.empty_report(protocol.INPUT))
     for _ in range(5000):
         bits = np.unpackbits(np.frombuffer(report, np.uint8))
         bits[rng.choice(512, rng.integers(1, 5), replace=False)] ^= 1
-        assert not protocol.is_sound(np.packbits(bits).tobytes())
+        assert not protocol.has_valid_checksum(np.packbits(bits).tobytes())
         bits = np.unpackbits(np.frombuffer(report, np.uint8), bitorder="little")
         first = rng.integers(0, 480)
         bits[first : first + 32] ^= np.append(1, rng.integers(0, 2, 31)).astype(np.uint8)
-        assert not protocol.is_sound(np.packbits(bits, bitorder="little").tobytes())
+        assert not protocol.has_valid_checksum(np.packbits(bits, bitorder="little").tobytes())
 
 
 def test_malformed_feature_report_error_names_size_and_number() -> None:
     with pytest.raises(SimError, match=r"has 3 bytes and number 9; expected 64"):
-        protocol.unsealed(b"\x09\x00\x00", protocol.IDENTITY)
+        protocol.decode_report(b"\x09\x00\x00", protocol.IDENTITY)
 
 
 def test_reference_main_loop_compiles_with_a_board_and_runs(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ void board_feed_hardware_watchdog(void) {{}}
         tmp_path, ROOT / "firmware" / "phantom_main.c", ROOT / "firmware" / "hvf_hid.c", board, program=True
     )
     raw = subprocess.run([program], capture_output=True, check=True).stdout
-    assert protocol.is_sound(raw)
+    assert protocol.has_valid_checksum(raw)
     report = np.frombuffer(raw, protocol.INPUT_REPORT)[0]
     assert (report["sequence"], report["time_us"], report["encoder"][1], report["boot"]) == (1000, 10**6, 10**6, 7)
 

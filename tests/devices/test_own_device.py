@@ -9,7 +9,7 @@ from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
 from sim.devices.driver import READ, DriverFault
-from sim.devices.hardware_list import check_there, open_device
+from sim.devices.hardware_list import check_present, open_device
 from sim.devices.own_device import TipDevice, TipDriver, TipPose
 from sim.errors import SimError
 from tests.devices.follow import device_follow, rms, simulated_follow
@@ -131,7 +131,7 @@ def test_follow_matches_simulation_within_1_mm() -> None:
 
 def test_example_device_opens_by_file_and_class() -> None:
     name = f"{EXAMPLE}:Mass"
-    check_there(name)
+    check_present(name)
     driver = open_device(name)
     assert driver.identity.name == "Mass"
     assert driver.read(np.zeros(9), 0.0)

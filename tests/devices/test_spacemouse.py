@@ -15,8 +15,8 @@ from models.phantom.kinematics import (
     within_limits,
 )
 from models.phantom.parameters import PREMIUM_1_5
-from sim.devices.driver import BAD, READ, DriverFault
-from sim.devices.spacemouse import TOP_SPEED, TOP_TURN, SpaceMouse
+from sim.devices.driver import READ, REFUSED, DriverFault
+from sim.devices.spacemouse import MAX_ANGULAR_SPEED, MAX_SPEED, SpaceMouse
 from tests.devices.test_hid import Clock
 
 
@@ -74,7 +74,7 @@ def test_full_push_moves_the_tip_at_top_speed_in_its_direction(mouse, cap, clock
     read_tip(mouse, clock, 1)
     cap.push(*push)
     p, _ = read_tip(mouse, clock, 100)
-    np.testing.assert_allclose(p, np.array(direction) * TOP_SPEED * 0.1, atol=1e-9)
+    np.testing.assert_allclose(p, np.array(direction) * MAX_SPEED * 0.1, atol=1e-9)
     cap.push(0, 0, 0)
     q, _ = read_tip(mouse, clock, 50)
     np.testing.assert_array_equal(p, q)
@@ -85,7 +85,7 @@ def test_twist_turns_the_stylus_about_the_same_axis(mouse, cap, clock) -> None:
     cap.turn(0, 0, -350)
     _, reading = read_tip(mouse, clock, 100)
     q = np.array(stylus_orientation(reading[3:6], reading[6:9]))
-    half = 0.5 * TOP_TURN * 0.1
+    half = 0.5 * MAX_ANGULAR_SPEED * 0.1
     np.testing.assert_allclose(q, [np.cos(half), 0.0, 0.0, np.sin(half)], atol=1e-9)
 
 
@@ -114,7 +114,7 @@ def test_tip_stays_in_workspace_and_gimbal_in_range_for_random_input(mouse, cap,
             assert low - 1e-9 <= angle <= high + 1e-9
         if last[0]:
             step = np.subtract(forward_kinematics(reading[3:6]), forward_kinematics(last[3:6]))
-            assert np.abs(step).max() <= TOP_SPEED * 0.05 + 1e-9
+            assert np.abs(step).max() <= MAX_SPEED * 0.05 + 1e-9
 
 
 def test_untouched_cap_does_not_drift_and_other_reports_are_ignored(mouse, cap, clock) -> None:
@@ -123,7 +123,7 @@ def test_untouched_cap_does_not_drift_and_other_reports_are_ignored(mouse, cap, 
     cap.queue.append(b"\x01\x00")  # too short
     p, _ = read_tip(mouse, clock, 100)
     assert not p.any()
-    assert mouse.telemetry[BAD] == 1.0
+    assert mouse.telemetry[REFUSED] == 1.0
     assert mouse.telemetry[READ] == 1.0
 
 

@@ -6,9 +6,22 @@ from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
-from models.phantom.kinematics import forward_kinematics, jacobian, joint_torques, least_gain, stylus_orientation
+from models.phantom.kinematics import (
+    forward_kinematics,
+    jacobian,
+    joint_torques,
+    min_singular_value,
+    stylus_orientation,
+)
 from sim.devices.driver import DriverFault
-from sim.devices.virtual_arm import SKEWED, WEAKEST, quaternion_of, skewness, tip_force, write_pose
+from sim.devices.virtual_arm import (
+    MAX_ORTHOGONALITY_ERROR,
+    MIN_SINGULAR_VALUE,
+    orthogonality_error,
+    quaternion_of,
+    tip_force,
+    write_pose,
+)
 
 
 def test_forward_kinematics_of_written_angles_gives_the_pose() -> None:
@@ -34,7 +47,7 @@ def test_quaternions_equal_scipy_also_at_half_a_turn(angle) -> None:
         ours, theirs = np.array(quaternion_of(rotation.as_matrix())), rotation.as_quat(scalar_first=True)
         np.testing.assert_allclose(ours * np.sign(ours @ theirs), theirs, atol=1e-14)
         assert ours[0] >= 0.0
-        assert skewness(rotation.as_matrix()) < 1e-14
+        assert orthogonality_error(rotation.as_matrix()) < 1e-14
 
 
 def test_tip_force_inverts_joint_torques_and_is_limited() -> None:
@@ -56,10 +69,10 @@ def test_closed_form_force_and_gain_equal_linear_algebra_over_the_workspace() ->
         theta, torque = tuple(rng.uniform(-1.6, 1.6, 3)), rng.normal(size=3)
         j = np.array(jacobian(theta))
         least = np.linalg.svd(j, compute_uv=False)[-1]
-        assert least_gain(theta) == pytest.approx(least, abs=1e-15)
-        expected = np.linalg.solve(j.T, torque - gravity_torques(theta)) if least >= WEAKEST else np.zeros(3)
+        assert min_singular_value(theta) == pytest.approx(least, abs=1e-15)
+        expected = np.linalg.solve(j.T, torque - gravity_torques(theta)) if least >= MIN_SINGULAR_VALUE else np.zeros(3)
         np.testing.assert_allclose(tip_force(theta, tuple(torque), 1e9), expected, rtol=1e-12, atol=1e-12)
-        singular += least < WEAKEST
+        singular += least < MIN_SINGULAR_VALUE
     assert 100 < singular < 1900
 
 
@@ -96,7 +109,7 @@ NO_ROTATIONS = {
     "point inversion": -TURN,
     "twice as long": 2.0 * TURN,
     "a row twice": TURN[[0, 1, 1]],
-    "sheared": TURN @ (np.eye(3) + 2.1 * SKEWED * np.eye(3, k=1)),
+    "sheared": TURN @ (np.eye(3) + 2.1 * MAX_ORTHOGONALITY_ERROR * np.eye(3, k=1)),
     "beyond all numbers": 1e200 * TURN,
 }
 
@@ -107,7 +120,7 @@ def test_orientation_that_is_no_rotation_is_a_fault(name) -> None:
     with pytest.raises(DriverFault) as refused:
         write_pose(reading, np.zeros(3), NO_ROTATIONS[name])
     assert refused.value.fault is Fault.READING_NOT_FINITE
-    assert refused.value.value > SKEWED
+    assert refused.value.value > MAX_ORTHOGONALITY_ERROR
     np.testing.assert_array_equal(reading, np.ones(9))
 
 

@@ -149,7 +149,7 @@ def resealed(raw: bytes, **changed: object) -> bytes:
     record = np.frombuffer(raw, protocol.INPUT_REPORT).copy().reshape(())
     for name, value in changed.items():
         record[name] = value
-    return protocol.sealed(record)
+    return protocol.encode_report(record)
 
 
 def field(report: bytes, name: str) -> int:
@@ -264,7 +264,7 @@ def wrong_version(wire: Wire, rng: np.random.Generator) -> int:
         record = np.frombuffer(bytes(genuine(report_num, max_length)), protocol.LAYOUTS[report_num]).copy().reshape(())
         if report_num == protocol.IDENTITY:
             record["major"] = major
-        return list(protocol.sealed(record))
+        return list(protocol.encode_report(record))
 
     wire.handle.get_feature_report = feature
     wire.firmware.power_up()

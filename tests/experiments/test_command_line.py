@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main, parsed
+from experiments.cli import main, parse_command
 from tests.experiments.refused_command import refused
 
 
@@ -148,8 +148,8 @@ def test_converted_file_is_not_replaced_without_overwrite(tmp_path: Path, capsys
 
 @pytest.mark.parametrize("command", ["convert", "prepare"])
 def test_negative_axis_is_parsed_as_option_value(command: str) -> None:
-    assert parsed([command, "in.bvh", "out.bvh", "--up", "-Y"]).up == "-Y"
-    assert parsed([command, "--up=-Z", "in.bvh", "out.bvh"]).up == "-Z"
+    assert parse_command([command, "in.bvh", "out.bvh", "--up", "-Y"]).up == "-Y"
+    assert parse_command([command, "--up=-Z", "in.bvh", "out.bvh"]).up == "-Z"
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ def _options_below(parser: ArgumentParser, name: str) -> Iterator[tuple[str, Act
 def options() -> list[tuple[str, Action]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # tyro's way to look at a parser is to be replaced by another
-        parser = tyro.extras.get_parser(cli.choice_of(commands.NAMES), config=cli._STYLE)
+        parser = tyro.extras.get_parser(cli.command_union(commands.NAMES), config=cli._STYLE)
     return list(_options_below(parser, "hvf"))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.safety.faults import Fault
 from experiments.hardware.link import measured_link
 from sim.devices.driver import DriverFault
-from sim.devices.hardware_list import found_devices, open_device
+from sim.devices.hardware_list import list_devices, open_device
 from tests.devices.firmware import Firmware
 from tests.hil.uhid_device import UhidDevice
 
@@ -32,9 +32,9 @@ def main(library: str) -> None:
     firmware = Firmware(Path(library))
     device, reading = UhidDevice(firmware), np.zeros(9)
     deadline = time.monotonic() + 10.0
-    while not found_devices() and time.monotonic() < deadline:
+    while not list_devices() and time.monotonic() < deadline:
         time.sleep(0.1)
-    check("the list", [(d.name, d.path, d.usable) for d in found_devices()], [("hid:HVF-0001", "/dev/hidraw0", True)])
+    check("the list", [(d.name, d.path, d.usable) for d in list_devices()], [("hid:HVF-0001", "/dev/hidraw0", True)])
     driver = open_device("hid:HVF-0001")
     check("identity", driver.identity[:4], ("Reference", "/dev/hidraw0", "HVF-0001", "1.0"))
 

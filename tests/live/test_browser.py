@@ -11,7 +11,7 @@ from experiments.config.words import run_config
 from experiments.live.cap_hand import CapHand
 from experiments.live.gate import Gate
 from experiments.live.panels.hand_keys import STEP
-from experiments.live.session.desk import MOST_BYTES
+from experiments.live.session.desk import MAX_UPLOAD_BYTES
 from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording
@@ -213,7 +213,7 @@ def test_upload_of_invalid_motion_is_answered_in_the_page(tab: Any, served: Serv
 
 def test_upload_beyond_the_size_limit_is_answered_in_the_page(tab: Any, served: ServedPage, tmp_path: Path) -> None:
     large = tmp_path / "large.bvh"
-    large.write_bytes(b"HIERARCHY\n" + b" " * (MOST_BYTES + 500_000))
+    large.write_bytes(b"HIERARCHY\n" + b" " * (MAX_UPLOAD_BYTES + 500_000))
     upload(tab, large)
     tab.get_by_text("large.bvh has 30.5 MB", exact=False).last.wait_for()
     assert not (served.desk.folder / "uploads" / "large.bvh").exists()

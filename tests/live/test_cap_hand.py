@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.live import cap_hand
-from experiments.live.cap_hand import RESTS, CapHand
-from sim.devices.spacemouse import TOP_SPEED, SpaceMouse
+from experiments.live.cap_hand import RELEASE_DELAY, CapHand
+from sim.devices.spacemouse import MAX_SPEED, SpaceMouse
 from tests.devices.test_hid import Clock
 from tests.devices.test_spacemouse import Cap
 
@@ -33,13 +33,13 @@ def test_pushed_cap_moves_the_hand_and_rest_releases_it(hand: tuple[CapHand, Cap
         wish = on_cap.wish(STYLUS)
     assert wish is not None
     target, pressed = wish
-    np.testing.assert_allclose(target - STYLUS, [0.0, 0.0, 0.2 * TOP_SPEED], atol=0.03 * TOP_SPEED)
+    np.testing.assert_allclose(target - STYLUS, [0.0, 0.0, 0.2 * MAX_SPEED], atol=0.03 * MAX_SPEED)
     assert not pressed
     cap.push(0, 0, 0)
     on_cap.wish(STYLUS)
-    clock.now += 0.5 * RESTS
+    clock.now += 0.5 * RELEASE_DELAY
     assert on_cap.wish(STYLUS) is not None  # a short rest is none
-    clock.now += 2.0 * RESTS
+    clock.now += 2.0 * RELEASE_DELAY
     assert on_cap.wish(STYLUS) is None
 
 
@@ -53,5 +53,5 @@ def test_first_button_is_the_switch(hand: tuple[CapHand, Cap, Clock]) -> None:
 
 
 def test_missing_spacemouse_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cap_hand, "found_devices", lambda: [])
-    assert cap_hand.cap_there() == (None, "")
+    monkeypatch.setattr(cap_hand, "list_devices", lambda: [])
+    assert cap_hand.open_cap_hand() == (None, "")

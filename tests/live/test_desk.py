@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.config.words import run_config
-from experiments.live.session.desk import MOST_BYTES, Desk
+from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh
 from sim.errors import SimError
@@ -123,7 +123,7 @@ def test_run_continues_from_an_earlier_state(desk: LoggingDesk) -> None:
 
 def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path: Path) -> None:
     with pytest.raises(SimError, match="expected at most 30 MB"):
-        desk.upload("large.bvh", bytes(MOST_BYTES + 1))
+        desk.upload("large.bvh", bytes(MAX_UPLOAD_BYTES + 1))
     with pytest.raises(SimError, match="no motion file"):
         desk.upload("picture.png", b"")
     desk.upload("../../broken.bvh", b"HIERARCHY\nROOT nobody\n{ oh }\n")

@@ -8,7 +8,7 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import TRACE_SIZE
 from experiments.config.words import run_config
-from experiments.live.session.engine import STRONGEST, Drag, Engine
+from experiments.live.session.engine import MAX_HAND_FORCE, Drag, Engine
 from experiments.live.session.engine_process import slice_points
 from experiments.live.session.gains import gains_of, with_gain
 from experiments.live.session.takes import Take
@@ -64,7 +64,7 @@ def test_drag_force_is_bounded():
         engine.advance()
         strongest = max(strongest, float(np.linalg.norm(engine.logs[0].user, axis=1).max()))
     # The spring is bounded at every block, and so is the speed at which the damper takes the stylus along.
-    assert STRONGEST / 2.0 < strongest < 1.5 * STRONGEST
+    assert MAX_HAND_FORCE / 2.0 < strongest < 1.5 * MAX_HAND_FORCE
 
 
 def test_bend_undo_and_redo_restore_the_curve():

@@ -70,7 +70,7 @@ def test_number_beyond_slider_is_refused_and_the_gain_restored(
     assert desk.config.mode.stiffness == 400.0
     panel.write()
     assert slider.value == 20000.0  # typing may not be finished
-    monkeypatch.setattr(gains_panel, "TYPING", -1.0)
+    monkeypatch.setattr(gains_panel, "PENDING_EDIT_TIME", -1.0)
     panel.write()
     assert slider.value == 400.0
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.live.session import desk
-from experiments.live.session.desk import UNWATCHED, Desk
+from experiments.live.session.desk import UNATTENDED_TIMEOUT, Desk
 
 
 def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,7 +19,7 @@ def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
         {"recording": np.ones(1)},
     )
     monkeypatch.setattr(desk.time, "monotonic", lambda: now[0])
-    for browsers, seconds in ((1, 1.0), (0, UNWATCHED - 1.0), (1, 1.0), (0, UNWATCHED - 1.0)):
+    for browsers, seconds in ((1, 1.0), (0, UNATTENDED_TIMEOUT - 1.0), (1, 1.0), (0, UNATTENDED_TIMEOUT - 1.0)):
         now[0] += seconds
         bare_desk.watched(browsers)
     assert not stops
@@ -28,6 +28,6 @@ def test_unwatched_take_is_ended_once(monkeypatch: pytest.MonkeyPatch) -> None:
     bare_desk.watched(0)
     assert len(stops) == len(messages) == 1
     bare_desk.now["recording"][:] = 0.0
-    now[0] += 2.0 * UNWATCHED
+    now[0] += 2.0 * UNATTENDED_TIMEOUT
     bare_desk.watched(0)
     assert len(stops) == 1

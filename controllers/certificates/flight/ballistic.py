@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.certificates.flight.flight_fit import (
-    SHORTEST_FLIGHT,
+    MIN_FLIGHT_DURATION,
     FlightFit,
     Mask,
-    best_fall,
     find_flights,
     fit_flight,
+    fit_free_fall,
     reachable_rates,
 )
 from controllers.certificates.flight.tolerance import BallisticTolerance
@@ -162,7 +162,7 @@ def ballistic_verdict(
         f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
         "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
         "flights are what contacts of feet, hands and other parts leave, of five frames and "
-        f"{SHORTEST_FLIGHT} s or more",
+        f"{MIN_FLIGHT_DURATION} s or more",
         f"a turn about the vertical of up to {9.4 * np.rad2deg(tolerance.yaw):.0f}° that begins and ends in the air "
         "is not noticed",
     )
@@ -179,7 +179,7 @@ def ballistic_verdict(
     if refuted:
         fit = refuted[0].fit
         com = motion.com[fit.start : fit.end + 1]
-        distance, (position, velocity) = best_fall(com, motion.fps, 1.0)
+        distance, (position, velocity) = fit_free_fall(com, motion.fps, 1.0)
         counterexample = {
             "start": fit.start, "end": fit.end, "position": position, "velocity": velocity,
             "momentum": fit.momentum, "distance": distance,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.certificates.flight.flight_fit import NOISE
+from controllers.certificates.flight.flight_fit import COM_NOISE
 from controllers.certificates.flight.tolerance import ContactTolerance
 from controllers.state import Array, Mask
 
@@ -79,7 +79,7 @@ def _jump_doubts(
     doubts: list[str] = []
     if len(com) > 2:
         size = np.linalg.norm(np.diff(com, 2, axis=0), axis=1) * fps**2
-        at, limit = int(np.argmax(size)), tolerance.push + 4.0 * NOISE * fps**2
+        at, limit = int(np.argmax(size)), tolerance.push + 4.0 * COM_NOISE * fps**2
         figures["jump"] = float(size[at])
         if size[at] > limit:
             doubts.append(

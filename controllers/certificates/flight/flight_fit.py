@@ -15,9 +15,9 @@ from scipy.special import stdtrit
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
 
-NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
-FEWEST = 5  # frames of a flight: two more than a parabola has coefficients
-SHORTEST_FLIGHT = 0.08  # [s] a shorter gap in support occurs when a foot rolls over
+COM_NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
+MIN_FLIGHT_FRAMES = 5  # frames of a flight: two more than a parabola has coefficients
+MIN_FLIGHT_DURATION = 0.08  # [s] a shorter gap in support occurs when a foot rolls over
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[True], supported, [True]]).astype(np.int8)))
     spans = [(max(int(a) - 1, 0), min(int(b), len(supported) - 1)) for a, b in edges.reshape(-1, 2)]
-    return [(a, b) for a, b in spans if b - a + 1 >= FEWEST and (b - a) / fps >= SHORTEST_FLIGHT]
+    return [(a, b) for a, b in spans if b - a + 1 >= MIN_FLIGHT_FRAMES and (b - a) / fps >= MIN_FLIGHT_DURATION]
 
 
 def fit_flight(
@@ -120,7 +120,7 @@ def fit_flight(
     residual = c - np.column_stack(
         [horizontal[0] + np.outer(middle, horizontal[1]), np.vander(middle, 3, True) @ height]
     )
-    spread = max(float(np.sqrt(np.sum(residual[:, 2] ** 2) / (len(t) - 3))), NOISE)
+    spread = max(float(np.sqrt(np.sum(residual[:, 2] ** 2) / (len(t) - 3))), COM_NOISE)
     covariance = np.linalg.inv(np.vander(middle, 3).T @ np.vander(middle, 3))
     uncertainty = 2.0 * spread * np.sqrt(covariance[0, 0]) * float(stdtrit(len(t) - 3, 0.975))
     air = slice(a + 1, b)
@@ -138,7 +138,7 @@ def fit_flight(
     )  # fmt: skip
 
 
-def best_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
+def fit_free_fall(com: Array, fps: float, rate: float) -> tuple[float, Array]:
     """The free fall nearest to a flight played at a rate.
 
     Minimises the greatest distance over initial position and velocity by Lawson's iteration: least squares, reweighted
@@ -187,7 +187,7 @@ def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, fl
     Parameters
     ----------
     com, fps
-        As in `best_fall`.
+        As in `fit_free_fall`.
     tolerance : float
         Largest distance [m].
 
@@ -198,7 +198,7 @@ def reachable_rates(com: Array, fps: float, tolerance: float) -> tuple[float, fl
     """
 
     def fall_distance(inverse: float) -> float:
-        return best_fall(com, fps, 1.0 / np.sqrt(max(inverse, 1e-9)))[0]
+        return fit_free_fall(com, fps, 1.0 / np.sqrt(max(inverse, 1e-9)))[0]
 
     duration = (len(com) - 1) / fps
     low, high = 0.0, 16.0 * (np.ptp(com[:, 2]) + tolerance) / (GRAVITY * duration**2) + 1.0

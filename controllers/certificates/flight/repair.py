@@ -19,7 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.interrupts import heeding_interrupts
+from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.errors import ControllerError, ParameterError
 from controllers.gravity import GRAVITY
 from controllers.state import Array, Mask
@@ -170,7 +170,7 @@ def repair(task: RepairTask) -> RepairPlan:
     opti.minimize(cost / n)
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 500, "tol": 1e-6})
     try:
-        with heeding_interrupts():
+        with raise_lost_interrupts():
             solution = opti.solve()
     except RuntimeError:
         raise RepairError(

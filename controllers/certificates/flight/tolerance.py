@@ -95,7 +95,7 @@ class ContactTolerance:
 
 
 @dataclass(frozen=True)
-class Judging:
+class JudgementCriteria:
     """Criteria by which a clip is judged.
 
     Parameters
@@ -122,4 +122,4 @@ class Judging:
             raise ParameterError(f"the coefficient of friction is {self.friction}; expected a finite number > 0")
 
 
-JUDGING = Judging()
+DEFAULT_CRITERIA = JudgementCriteria()

@@ -8,16 +8,16 @@ import numpy as np
 
 from controllers.certificates.loop.case_hull import slopes_of
 from controllers.certificates.loop.device import Symbol, vector
-from controllers.certificates.loop.law_cases import MOST_CASES, Cases
+from controllers.certificates.loop.law_cases import MAX_CASES, Cases
 from controllers.certificates.loop.laws import Law
-from controllers.certificates.loop.stability import PHASES, River
+from controllers.certificates.loop.stability import N_PHASES, River
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.errors import ControllerError
 from controllers.state import Array
 
 # Phases of the curve at which a law is linearised: 20 times as many as those of the loop, since a case may hold on only
 # a short part of the curve.
-REFERENCES = 20 * PHASES
+REFERENCES = 20 * N_PHASES
 
 
 def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
@@ -52,8 +52,8 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
     for cases in smooth:
         cases.check_slopes(references)
     hulls = [slopes_of(cases, references) for cases in switched]
-    if np.prod([len(hull) for hull in hulls]) > MOST_CASES:
-        raise ControllerError(f"the laws of one's own have more than {MOST_CASES} cases together")
+    if np.prod([len(hull) for hull in hulls]) > MAX_CASES:
+        raise ControllerError(f"the laws of one's own have more than {MAX_CASES} cases together")
     combined = [sum(slopes, np.zeros((3, 6))) for slopes in itertools.product(*hulls)]
     return [river._replace(law=_law_with_added(river, smooth, switched, slope)) for slope in combined]
 

@@ -25,7 +25,7 @@ from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
-from controllers.fields.follow import PACES
+from controllers.fields.follow import PACE_RANGE
 from controllers.fields.river import window
 from controllers.safety.energy_tank import river_power
 from controllers.state import Array
@@ -116,7 +116,7 @@ def distance_bound(river: River, gain: float, force: float) -> float:
     return float("inf")
 
 
-class Pushed(NamedTuple):
+class PushedRiver(NamedTuple):
     """A river under the push of a hand.
 
     Attributes
@@ -168,7 +168,10 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     """
     moving = river.moving()
     gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
-    pushed, executed = Pushed(river, gain, float(own_force(river, moving).max()), ceiling), injection(river, moving)
+    pushed, executed = (
+        PushedRiver(river, gain, float(own_force(river, moving).max()), ceiling),
+        injection(river, moving),
+    )
     allowed, (distance, felt) = pushed.most(), pushed.bounds(push)
     figures = _power_figures(river, moving, executed) | {
         "speed_bound": float(_curve_speed(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,
@@ -210,7 +213,7 @@ def _power_figures(river: River, moving: LinearLoop, executed: Injection) -> dic
         "terminal_speed": speed,
         "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
         "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
-        "power_bound": river_power(river.b_d, (PACES[1] if river.law.parallel else 1.0) * float(np.max(pace))),
+        "power_bound": river_power(river.b_d, (PACE_RANGE[1] if river.law.parallel else 1.0) * float(np.max(pace))),
         "passive_below": executed.passive_below,
         **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
         "rounding_force": executed.rounding,

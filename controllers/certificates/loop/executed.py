@@ -34,7 +34,7 @@ _MIN_OSCILLATION_ANGLE = 1e-2  # [rad per period] an eigenvalue with a smaller a
 _DIRECTIONS = 4  # transverse directions in which states off the curve are examined
 
 
-class Seen(NamedTuple):
+class WorstState(NamedTuple):
     """The worst of the examined states.
 
     Attributes
@@ -66,7 +66,7 @@ class Seen(NamedTuple):
     abrupt: tuple[Array, ...] = ()
 
 
-class Differenced(NamedTuple):
+class ProgramLinearisation(NamedTuple):
     """A linear loop with the derivatives of a program, and whether they exist in each of its n states, shape (n,)."""
 
     loop: LinearLoop
@@ -81,7 +81,7 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
     return wrench[:3].copy()
 
 
-def differenced(linear: LinearLoop, program: Program, river: River, states: States) -> Differenced:
+def linearise_program(linear: LinearLoop, program: Program, river: River, states: States) -> ProgramLinearisation:
     """The linear loop of `river` with the program's derivatives at n hands; use it with k_r = 1, b_d = 0.
 
     `linear` has the plant at the same phases, possibly of a slowed-down curve; hands need not be on the curve. Their
@@ -111,7 +111,7 @@ def differenced(linear: LinearLoop, program: Program, river: River, states: Stat
         smooth[i] = all(slope is not None for slope in found)
         for slopes, slope in zip((by_theta, by_omega), found, strict=True):
             slopes[0, i] = 0.0 if slope is None or not smooth[i] else slope
-    return Differenced(replace(linear, unit_theta=by_theta, unit_omega=by_omega), smooth)
+    return ProgramLinearisation(replace(linear, unit_theta=by_theta, unit_omega=by_omega), smooth)
 
 
 def _derivative(changes: Sequence[Array]) -> Array | None:
@@ -124,9 +124,9 @@ def _derivative(changes: Sequence[Array]) -> Array | None:
     return central.T if spread <= _SLOPE_TOLERANCE * np.abs(central).max() + _MIN_SLOPE else None
 
 
-def looked_at(
+def examine_curve(
     program: Program, river: River, reach: float, hands: Sequence[HandImpedance], pace: float = 1.0, n: int = 16
-) -> Seen:
+) -> WorstState:
     """The worst of states on the curve, at rest and at `pace` times its speed, and of states `reach` [m] off it."""
     phases = river.phases(n)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
@@ -139,26 +139,28 @@ def looked_at(
     return _worst_state(program, river, states, hands)
 
 
-def looked_about(program: Program, river: River, hands: Sequence[HandImpedance]) -> Seen:
+def examine_random_states(program: Program, river: River, hands: Sequence[HandImpedance]) -> WorstState:
     """The worst of the random states about the curve (`states_about`), which a user-defined law cannot anticipate."""
     return _worst_state(program, river, [states_about(river.curve)], hands)
 
 
-def _worst_state(program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]) -> Seen:
+def _worst_state(
+    program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]
+) -> WorstState:
     """The worst of several sets of states near the same phases, with every hand.
 
     States out of reach are omitted, and so are those in which the limit of the whole program reduces its force: a
     certificate assumes that it does not.
     """
     plants = [(hand, river.still_at(states[0].phases, hand)) for hand in hands]
-    worst = Seen(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
+    worst = WorstState(0.0, float(states[0].phases[0]), states[0].p[0], states[0].v[0], hands[0], 0, 0.0)
     strongest, abrupt = 0.0, list[Array]()
     *_, (last, numbers) = program.composition()
     limit = numbers[0] if last is Join.LIMIT else np.inf  # of the whole field; an earlier one is of a part
     for phases, wanted, v in states:
         reachable = np.array([_is_reachable(river, place) for place in wanted])
         p = np.where(reachable[:, None], wanted, river.curve.point(phases))
-        law, smooth = differenced(plants[0][1], program, river, States(phases, p, v))
+        law, smooth = linearise_program(plants[0][1], program, river, States(phases, p, v))
         fresh = program.fresh_memory()
         sizes = np.linalg.norm(
             [force_at(program, fresh, *state) for state in zip(p, v, phases.tolist(), strict=True)], axis=1

@@ -1,6 +1,6 @@
 """Symbolic execution of a user-defined law: numbers of the hand as CasADi symbols whose comparisons are decided.
 
-A Python function that compares numbers of the hand takes one of several paths. Every comparison asks a `Way` (one path)
+A Python function that compares numbers of the hand takes one of several paths. Every comparison asks an `ExecutionPath`
 for its truth; the path answers with the decisions that it was given, and records what was decided. All paths together,
 with their conditions, are the function (King, *Symbolic execution and program testing*, CACM 19(7), 1976).
 """
@@ -17,10 +17,10 @@ from controllers.certificates.loop.device import Symbol
 from controllers.errors import ControllerError
 
 _MAX_DEPTH = 1000  # depth to which nested operations are compared; deeper expressions count as different
-MOST_CONDITIONS = 64  # decisions on one path: more indicate a loop that does not end on symbols
+MAX_CONDITIONS = 64  # decisions on one path: more indicate a loop that does not end on symbols
 
 
-class NotFollowed(ControllerError):
+class NotExecutable(ControllerError):
     """A function that cannot be executed on symbols."""
 
 
@@ -55,7 +55,7 @@ def identical(a: Symbol, b: Symbol) -> bool:
 _TRUE_SIGNS = {"<": frozenset((-1,)), "<=": frozenset((-1, 0)), "==": frozenset((0,))}
 
 
-class Way:
+class ExecutionPath:
     """One path through a function: the first decisions are given, and every further comparison is taken to hold.
 
     A comparison whose result follows from earlier ones of the same two numbers is not decided again.
@@ -79,8 +79,8 @@ class Way:
         if signs <= true or not signs & true:
             return signs <= true
         at = len(self.conditions)
-        if at >= MOST_CONDITIONS:
-            self.lose(f"it compares numbers of the hand more than {MOST_CONDITIONS} times")
+        if at >= MAX_CONDITIONS:
+            self.lose(f"it compares numbers of the hand more than {MAX_CONDITIONS} times")
         holds = self.given[at] if at < len(self.given) else True
         remaining = signs & true if holds else signs - true
         self._possible_signs += ((gap, remaining), (casadi.SX(right - left), frozenset(-sign for sign in remaining)))
@@ -90,7 +90,7 @@ class Way:
     def lose(self, why: str) -> NoReturn:
         """Give up on the function. The reason is stored, since the function may catch the exception."""
         self.lost = self.lost or why
-        raise NotFollowed(why)
+        raise NotExecutable(why)
 
 
 _CONVERSION_MESSAGE = (
@@ -103,26 +103,26 @@ def _hypot(a: Symbol, b: Symbol) -> Symbol:
     return casadi.sqrt(a * a + b * b)
 
 
-class FollowedNumber:
-    """A number of the hand, or one that a function computed from it, on one `Way`."""
+class SymbolicNumber:
+    """A number of the hand, or one that a function computed from it, on one `ExecutionPath`."""
 
     __slots__ = ("symbol", "way")
     __hash__: ClassVar[None]  # pyright: ignore[reportIncompatibleMethodOverride]
 
-    def __init__(self, symbol: Symbol, way: Way) -> None:
+    def __init__(self, symbol: Symbol, way: ExecutionPath) -> None:
         self.symbol = symbol
         self.way = way
 
     def _combine(self, other: object, operation: Callable[[Symbol, Symbol], Symbol]) -> Any:
         """A number computed from this and another one; any other operand is left to Python, and arrays to NumPy."""
-        if isinstance(other, FollowedNumber):
-            return FollowedNumber(operation(self.symbol, other.symbol), self.way)
+        if isinstance(other, SymbolicNumber):
+            return SymbolicNumber(operation(self.symbol, other.symbol), self.way)
         if isinstance(other, Real | np.bool_):
-            return FollowedNumber(operation(self.symbol, float(other)), self.way)
+            return SymbolicNumber(operation(self.symbol, float(other)), self.way)
         return NotImplemented
 
     def _compare(self, other: object, kind: Literal["<", "<=", "=="], swapped: bool = False) -> Any:
-        if isinstance(other, FollowedNumber):
+        if isinstance(other, SymbolicNumber):
             value: Any = other.symbol
         elif isinstance(other, Real | np.bool_):
             value = float(other)
@@ -158,13 +158,13 @@ class FollowedNumber:
     def __rpow__(self, other: object) -> Any:
         return self._combine(other, lambda a, b: b**a)
 
-    def __neg__(self) -> "FollowedNumber":
-        return FollowedNumber(-self.symbol, self.way)
+    def __neg__(self) -> "SymbolicNumber":
+        return SymbolicNumber(-self.symbol, self.way)
 
-    def __pos__(self) -> "FollowedNumber":
+    def __pos__(self) -> "SymbolicNumber":
         return self
 
-    def __abs__(self) -> "FollowedNumber":
+    def __abs__(self) -> "SymbolicNumber":
         return self if self >= 0.0 else -self
 
     def __lt__(self, other: object) -> Any:
@@ -196,8 +196,8 @@ class FollowedNumber:
 
     # For its functions of the same names, NumPy calls these methods of an object.
 
-    def _apply(self, function: Callable[[Symbol], Symbol]) -> "FollowedNumber":
-        return FollowedNumber(function(self.symbol), self.way)
+    def _apply(self, function: Callable[[Symbol], Symbol]) -> "SymbolicNumber":
+        return SymbolicNumber(function(self.symbol), self.way)
 
     sqrt = partialmethod(_apply, casadi.sqrt)
     exp = partialmethod(_apply, casadi.exp)
@@ -215,15 +215,15 @@ class FollowedNumber:
     hypot = partialmethod(_combine, operation=_hypot)
 
 
-class FollowedVector(np.ndarray[Any, np.dtype[Any]]):
-    """A vector of the hand as an array of `FollowedNumber`; its Euclidean norm is a `FollowedNumber`, too."""
+class SymbolicVector(np.ndarray[Any, np.dtype[Any]]):
+    """A vector of the hand as an array of `SymbolicNumber`; its Euclidean norm is a `SymbolicNumber`, too."""
 
     @staticmethod
-    def of(symbols: Symbol, way: Way) -> "FollowedVector":
+    def of(symbols: Symbol, way: ExecutionPath) -> "SymbolicVector":
         """Vector of a column of symbols."""
         numbers = np.empty(symbols.numel(), dtype=object)
-        numbers[:] = [FollowedNumber(symbols[i], way) for i in range(symbols.numel())]
-        return numbers.view(FollowedVector)
+        numbers[:] = [SymbolicNumber(symbols[i], way) for i in range(symbols.numel())]
+        return numbers.view(SymbolicVector)
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         # NumPy's own norm converts the numbers to floats.

@@ -21,7 +21,7 @@ from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
 from controllers.certificates.loop.laws import Law, nearest_phase
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River, stability, unstable_start
+from controllers.certificates.loop.stability import River, counterexample, stability
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import piece_velocity
 
@@ -56,7 +56,7 @@ def response_along(loop: SampledLoop, k_r: float, b_d: float) -> npt.NDArray[np.
     return np.sum(residues[:, None, :] / (z[None, :, None] - values[:, None, :]), axis=2)
 
 
-def most_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
+def max_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
     """Largest b [N s/m] for which the circle criterion holds at every phase; 0 if the loop is unstable at b = 0."""
     if loop.radius(k_r, b_d).max() >= 1.0:
         return 0.0
@@ -81,7 +81,7 @@ def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]
         radius = SampledLoop(river_with_damper.still(hand), river.sampling).radius(river.k_r, river.b_d)
         if radius.max() > worst:
             worst, worst_case = float(radius.max()), (hand, int(radius.argmax()))
-        largest = min(largest, most_drag(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d))
+        largest = min(largest, max_drag(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d))
     summary = f"governor of {drag:g} N s/m, certain up to {largest:.3g}"
     figures = {**alone.figures, "governor_drag": drag, "governor_certain": largest, "governor_radius": worst}
     assumptions = (
@@ -89,7 +89,7 @@ def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]
         "the governor's admissible speeds are held as they are at a phase; it acts or rests at any tick",
     )
     if worst >= 1.0:
-        example = unstable_start(river_with_damper, *worst_case)
+        example = counterexample(river_with_damper, *worst_case)
         refutation = f"unstable while the governor acts, by a factor of {worst:.4g} a period: {summary}; {alone.reason}"
         return Verdict("refuted", refutation, largest / drag - 1.0, assumptions, example, figures)
     margin = min(alone.margin or 0.0, largest / drag - 1.0)

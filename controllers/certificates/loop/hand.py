@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
-from controllers.checks import check_kinds
+from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
+from controllers.checks import check_field_types
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -34,7 +34,7 @@ class HandImpedance:
     stiffness: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, limit in (("mass", _MAX_MASS), ("damping", MOST_DAMPING), ("stiffness", MOST_STIFFNESS)):
+        for name, limit in (("mass", _MAX_MASS), ("damping", MAX_DAMPING), ("stiffness", MAX_STIFFNESS)):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ParameterError(f"{name} of a hand must be finite and at least 0, got {value}")
@@ -74,7 +74,7 @@ class HandRange:
     stiffness: tuple[float, float] = (0.0, 500.0)
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
 
     def hands(self) -> list[HandImpedance]:
         """No hand, the corners and the middle.

@@ -8,8 +8,11 @@ from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, HandState
 
 HANDS = 50  # states of the hand at which a law is compared with its expression
-NEAREST, FURTHEST = 1e-5, 5e-3  # [m] distance from the curve: from the encoders' rounding to a fifth of a map's reach
-SLOWEST, FASTEST = 1e-3, 0.1  # [m/s] speed relative to the curve's motion, up to that of a hand that pushes
+MIN_DISTANCE, MAX_DISTANCE = (
+    1e-5,
+    5e-3,
+)  # [m] distance from the curve: from the encoders' rounding to a fifth of a map's reach
+MIN_SPEED, MAX_SPEED = 1e-3, 0.1  # [m/s] speed relative to the curve's motion, up to that of a hand that pushes
 _SEED = 3
 
 
@@ -27,17 +30,17 @@ def states_about(curve: Trajectory, n: int = HANDS) -> States:
     # Away from the ends of an open curve, where it may stand still.
     phases = curve.start + curve.duration * rng.uniform(0.01, 0.99, size=n)
     offset, relative_velocity = (rng.normal(size=(n, 3)) for _ in range(2))
-    offset *= np.geomspace(NEAREST, FURTHEST, n)[rng.permutation(n), None] / np.linalg.norm(
+    offset *= np.geomspace(MIN_DISTANCE, MAX_DISTANCE, n)[rng.permutation(n), None] / np.linalg.norm(
         offset, axis=1, keepdims=True
     )
-    relative_velocity *= np.geomspace(SLOWEST, FASTEST, n)[rng.permutation(n), None] / np.linalg.norm(
+    relative_velocity *= np.geomspace(MIN_SPEED, MAX_SPEED, n)[rng.permutation(n), None] / np.linalg.norm(
         relative_velocity, axis=1, keepdims=True
     )
     pace = rng.choice([0.0, 0.5, 1.0, 1.5], size=(n, 1))
     return States(phases, curve.point(phases) + offset, pace * curve.velocity(phases) + relative_velocity)
 
 
-def hands_about(curve: Trajectory) -> list[HandState]:
+def sample_hands(curve: Trajectory) -> list[HandState]:
     """The states of `states_about`, and as many on the curve, with random time, orientation, turning and switch."""
     rng, (phases, p, v) = np.random.default_rng(_SEED), states_about(curve)
     found: list[HandState] = []
@@ -54,7 +57,7 @@ def hands_about(curve: Trajectory) -> list[HandState]:
     return found
 
 
-def told(p: Array, v: Array | None = None) -> str:
+def state_text(p: Array, v: Array | None = None) -> str:
     """Position and, if given, velocity of a hand as text for messages."""
     place = f"p = ({', '.join(f'{1e3 * x:.3g}' for x in p)}) mm"
     return place if v is None else f"{place}, v = ({', '.join(f'{x:.3g}' for x in v)}) m/s"

@@ -10,13 +10,13 @@ import numpy as np
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.followed_number import (
     Condition,
-    FollowedNumber,
-    FollowedVector,
-    NotFollowed,
-    Way,
+    ExecutionPath,
+    NotExecutable,
+    SymbolicNumber,
+    SymbolicVector,
     identical,
 )
-from controllers.certificates.loop.hands_about import hands_about, told
+from controllers.certificates.loop.hands_about import sample_hands, state_text
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.program import evaluate
@@ -24,7 +24,7 @@ from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import FunctionLaw
 from controllers.state import Array, HandState, Mask
 
-MOST_CASES = 16  # largest number of paths through a function: that of four independent comparisons
+MAX_CASES = 16  # largest number of paths through a function: that of four independent comparisons
 # Relative difference of two forces from the same operations in another order: rounding, magnified by cancellation.
 _FORCE_TOLERANCE = 1e-9
 _MIN_FORCE = 1e-12  # [N] smaller than any force
@@ -100,7 +100,8 @@ class Cases:
         if wrong.any():
             at = hands[int(np.argmax(wrong))]
             raise ControllerError(
-                f"the force of {self.law.place} has no derivative for a hand on the curve, at {told(at[:3], at[3:])}"
+                f"the force of {self.law.place} has no derivative for a hand on the curve, at "
+                f"{state_text(at[:3], at[3:])}"
             )
 
     def force(self, p: Symbol, v: Symbol) -> Symbol:
@@ -115,7 +116,7 @@ def cases_of(law: FunctionLaw) -> Cases:
     Raises
     ------
     ControllerError
-        If it cannot be executed on symbols, has more than `MOST_CASES` paths, or its force depends on anything but the
+        If it cannot be executed on symbols, has more than `MAX_CASES` paths, or its force depends on anything but the
         hand's position and velocity.
     """
     sym = casadi.SX.sym
@@ -123,11 +124,11 @@ def cases_of(law: FunctionLaw) -> Cases:
     found, pending = list[Case](), [tuple[bool, ...]()]
     while pending:
         given = pending.pop()
-        if len(found) == MOST_CASES:
+        if len(found) == MAX_CASES:
             raise ControllerError(
-                f"{law.place} has more than {MOST_CASES} cases; a certificate follows the comparisons of so many"
+                f"{law.place} has more than {MAX_CASES} cases; a certificate follows the comparisons of so many"
             )
-        path = Way(given)
+        path = ExecutionPath(given)
         wrench = _wrench_on_path(law, path, symbols)
         decisions = [condition.holds for condition in path.conditions]
         pending += [(*decisions[:at], not decisions[at]) for at in range(len(given), len(decisions))]
@@ -138,21 +139,21 @@ def cases_of(law: FunctionLaw) -> Cases:
     return Cases(law, symbols["p"], symbols["v"], tuple(found))
 
 
-def _wrench_on_path(law: FunctionLaw, path: Way, symbols: dict[str, Symbol]) -> list[Symbol]:
+def _wrench_on_path(law: FunctionLaw, path: ExecutionPath, symbols: dict[str, Symbol]) -> list[Symbol]:
     """Six numbers of a law along one path; as in a run, vectors of the hand are arrays, or tuples if compiled."""
 
     def given(name: str) -> Any:
-        numbers = FollowedVector.of(symbols[name], path)
+        numbers = SymbolicVector.of(symbols[name], path)
         return tuple(numbers) if isinstance(law, CompiledLaw) else numbers
 
-    t, switch = (FollowedNumber(symbols[name], path) for name in ("t", "s"))
+    t, switch = (SymbolicNumber(symbols[name], path) for name in ("t", "s"))
     hand = HandState(t, given("p"), given("q"), given("v"), given("w"), switch)  # pyright: ignore[reportArgumentType]
     try:
         # An entry may be an array without dimensions, as from np.where.
         numbers = [np.asarray(item, dtype=object).item() for item in law.function(hand, **law.parameters)]  # pyright: ignore[reportGeneralTypeIssues]
-        wrench = [item.symbol if isinstance(item, FollowedNumber) else casadi.SX(float(item)) for item in numbers]
+        wrench = [item.symbol if isinstance(item, SymbolicNumber) else casadi.SX(float(item)) for item in numbers]
     except Exception as error:  # whatever a user's function raises
-        why = path.lost or (str(error) if isinstance(error, NotFollowed) else f"{type(error).__name__}: {error}")
+        why = path.lost or (str(error) if isinstance(error, NotExecutable) else f"{type(error).__name__}: {error}")
     else:
         why = path.lost or (None if len(wrench) in (3, 6) else f"it gives {len(wrench)} numbers; expected three or six")
         if why is None:
@@ -189,22 +190,22 @@ def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Ar
     ParameterError
         If the function raises, or does not return three or six numbers.
     """
-    program, hands = law.program(), hands_about(curve)
+    program, hands = law.program(), sample_hands(curve)
     wrenches = np.empty((len(hands), 6))
     for hand, wrench in list(zip(hands, wrenches, strict=True))[:: -1 if backwards else 1]:
         memory = program.fresh_memory()
         try:
             program.feed(memory, hand)
             evaluate(*program.compiled(), memory, hand.vector(), wrench)
-        except NotFollowed:
-            raise NotFollowed(
+        except NotExecutable:
+            raise NotExecutable(
                 f"{law.place} keeps numbers of the hand between calls; a certificate is of a function of the hand alone"
             ) from None
         except ParameterError:
             raise
         except Exception as error:  # whatever a user's function raises
             raise ParameterError(
-                f"{law.place} raised {type(error).__name__}: {error}; for a hand at {told(hand.p, hand.v)}"
+                f"{law.place} raised {type(error).__name__}: {error}; for a hand at {state_text(hand.p, hand.v)}"
             ) from error
     return wrenches
 
@@ -229,7 +230,7 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
         return np.isnan(difference) | (difference > size)
 
     _refuse_if(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when it is asked again")
-    cases, hands = cases_of(law), hands_about(curve)
+    cases, hands = cases_of(law), sample_hands(curve)
     places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
     symbolic = np.array(cases.chosen.map(len(hands))(places, velocities)[0]).T
     _refuse_if(law, curve, differs(symbolic), "another force in a run than on symbols")
@@ -238,8 +239,8 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
 
 def _refuse_if(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> None:
     if wrong.any():
-        hand = hands_about(curve)[int(np.argmax(wrong))]
+        hand = sample_hands(curve)[int(np.argmax(wrong))]
         raise ControllerError(
-            f"{law.place} gives {what}, as for a hand at {told(hand.p, hand.v)}; a certificate is of a "
+            f"{law.place} gives {what}, as for a hand at {state_text(hand.p, hand.v)}; a certificate is of a "
             "function of the hand alone"
         )

@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.laws import Law
-from controllers.certificates.loop.sampled_loop import KEPT, SampledLoop
+from controllers.certificates.loop.sampled_loop import UNDELAYED_SIZE, SampledLoop
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.fields.leading import leading_force
 from controllers.state import Array
@@ -112,9 +112,9 @@ def walking(loop: SampledLoop, regime: Regime, scale: float, rate: float, k_l: f
         return maps
     shift = np.zeros((n, size + 2, linear.shift.shape[2] + 1))
     joints = np.linalg.solve(linear.jacobian, direction[:, :, None])
-    weight = np.tile(linear.weight_theta @ joints, (1, (size - KEPT) // 3, 1))
+    weight = np.tile(linear.weight_theta @ joints, (1, (size - UNDELAYED_SIZE) // 3, 1))
     shift[:, :size, :-1] = loop.shifts
-    shift[:, 0:3, -1:], shift[:, 6:9, -1:], shift[:, KEPT:size, -1:] = joints, joints, weight
+    shift[:, 0:3, -1:], shift[:, 6:9, -1:], shift[:, UNDELAYED_SIZE:size, -1:] = joints, joints, weight
     shift[:, size, -1] = scale
     basis = np.linalg.qr(shift, mode="complete")[0][:, :, shift.shape[2] :]
     return basis.transpose(0, 2, 1) @ maps @ basis

@@ -13,11 +13,11 @@ the directions across the curve; both conditions are for one axis and are applie
 import numpy as np
 
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.largest_gains import MOST_STIFFNESS
+from controllers.certificates.loop.largest_gains import MAX_STIFFNESS
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, unstable_start
+from controllers.certificates.loop.stability import River, counterexample
 from controllers.certificates.report import Verdict
 from controllers.state import Array
 
@@ -88,12 +88,12 @@ def passivity(river: River) -> Verdict:
     )
     if margin > 0.0:
         return Verdict("certified", reason, margin, assumptions, {}, figures)
-    for stiffness in np.geomspace(10.0, MOST_STIFFNESS, 24):
+    for stiffness in np.geomspace(10.0, MAX_STIFFNESS, 24):
         hand = HandImpedance(stiffness=float(stiffness))
         loop = SampledLoop(river.still(hand), river.sampling)
         radius = loop.radius(river.k_r, river.b_d)
         if radius.max() > 1.0:
-            example = unstable_start(river, hand, int(radius.argmax()))
+            example = counterexample(river, hand, int(radius.argmax()))
             reason += f"; a spring of {stiffness:.3g} N/m on the stylus makes it unstable"
             return Verdict("refuted", reason, margin, assumptions, example, figures)
     return Verdict("unknown", f"{reason}; no spring was found that makes it unstable", margin, assumptions, {}, figures)

@@ -17,7 +17,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.state import Array
 
 _PADE_ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
-PLANT, KEPT = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques
+PLANT, UNDELAYED_SIZE = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques
 
 
 def exponentials(matrices: Array) -> Array:
@@ -58,7 +58,7 @@ class SampledLoop:
     @property
     def size(self) -> int:
         """Size of the state ξ."""
-        return KEPT + 3 * (self.sampling.whole_delay + (self.sampling.rest_delay > 0.0))
+        return UNDELAYED_SIZE + 3 * (self.sampling.whole_delay + (self.sampling.rest_delay > 0.0))
 
     @cached_property
     def _response_cache(self) -> dict[float, tuple[Array, Array]]:
@@ -124,7 +124,7 @@ class SampledLoop:
         whole, rest = self.sampling.whole_delay, self.sampling.rest_delay
         torque = by_omega @ self._omega
         torque[:, :, 0:3] += by_theta
-        delayed_rows = np.eye(size)[KEPT:] if open_loop else np.zeros((size - KEPT, size))
+        delayed_rows = np.eye(size)[UNDELAYED_SIZE:] if open_loop else np.zeros((size - UNDELAYED_SIZE, size))
 
         def delayed_torque(age: int) -> Array:
             """Torque `age` ticks ago as a linear function of the state."""
@@ -137,8 +137,8 @@ class SampledLoop:
             early_free, early_driven = self.plant(rest)
             matrices[:, :PLANT] += free @ early_driven @ delayed_torque(whole + 1)
             free = free @ early_free
-        for age in range(1, (size - KEPT) // 3 + 1):
-            matrices[:, KEPT + 3 * age - 3 : KEPT + 3 * age] = delayed_torque(age - 1)
+        for age in range(1, (size - UNDELAYED_SIZE) // 3 + 1):
+            matrices[:, UNDELAYED_SIZE + 3 * age - 3 : UNDELAYED_SIZE + 3 * age] = delayed_torque(age - 1)
         if open_loop:
             matrices[:, :PLANT, :PLANT] += free
             matrices[:, 6:9, 0:3] = np.eye(3)
@@ -157,7 +157,7 @@ class SampledLoop:
         linear = self.linear
         # The delayed torques change by those of gravity compensation; the inertia along the lap is neglected.
         weight = linear.weight_theta @ linear.shift[:, :3]
-        return np.concatenate([linear.shift, np.tile(weight, (1, (self.size - KEPT) // 3, 1))], axis=1)
+        return np.concatenate([linear.shift, np.tile(weight, (1, (self.size - UNDELAYED_SIZE) // 3, 1))], axis=1)
 
     @cached_property
     def across(self) -> tuple[Array, Array]:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 from controllers.errors import ParameterError
 
-MOST_PERIODS = 128  # of a delay: each adds three states to the loop, and the time for its eigenvalues grows cubically
+MAX_DELAY_PERIODS = (
+    128  # of a delay: each adds three states to the loop, and the time for its eigenvalues grows cubically
+)
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,8 @@ class Sampling:
             raise ParameterError(f"period and cutoff of a loop must be positive and finite, got {self}")
         if self.delay < 0.0:
             raise ParameterError(f"the delay of a loop must be at least 0 s, got {self.delay}")
-        if self.delay > MOST_PERIODS * self.period:
-            limit = f"{MOST_PERIODS} periods of {self.period:g} s"
+        if self.delay > MAX_DELAY_PERIODS * self.period:
+            limit = f"{MAX_DELAY_PERIODS} periods of {self.period:g} s"
             raise ParameterError(f"the delay of a loop must be at most {limit}, got {self.delay} s")
 
     @property

@@ -9,23 +9,25 @@ import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
-from controllers.certificates.loop.largest_gains import MOST_DAMPING, MOST_STIFFNESS
+from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.linear_loop import LinearLoop, linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.sampling import MOST_PERIODS, Sampling
+from controllers.certificates.loop.sampling import MAX_DELAY_PERIODS, Sampling
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array, Mask
 
 _MIN_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
-GRID = 40  # gains of the grid before bisection; half or twice as many find the same critical gains along a curved path
+GAIN_GRID = (
+    40  # gains of the grid before bisection; half or twice as many find the same critical gains along a curved path
+)
 # Phases of the curve at which the loop is examined; with eight times as many, critical gains are 0.1 % lower.
-PHASES = 48
+N_PHASES = 48
 _FINE_PHASE_COUNT = 4000  # phases at which properties of the curve alone are evaluated, as in `region.remainder`
 LAP_PHASES = 400  # phases for the Floquet multipliers of a lap; four times as many change their logarithm by 0.01 %
-CUTS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may reduce a force
-LATEST = 16  # periods of delay at which the search for the delay margin ends
+LIMITER_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may reduce a force
+MAX_MARGIN_PERIODS = 16  # periods of delay at which the search for the delay margin ends
 
 
 class River(NamedTuple):
@@ -48,7 +50,7 @@ class River(NamedTuple):
         speed = np.linalg.norm(self.curve.velocity(phases), axis=1)
         return float((speed * np.where(speed > 0.0, self.curve.curvature(phases), 0.0)).max())
 
-    def phases(self, n: int = PHASES) -> Array:
+    def phases(self, n: int = N_PHASES) -> Array:
         """Equally spaced phases of the curve [s]: all around a closed curve, or inside the ends of an open one."""
         if self.curve.periodic:
             return self.curve.start + self.curve.duration * np.arange(n) / n
@@ -86,19 +88,19 @@ def neighbours(values: Array, periodic: bool) -> tuple[Array, Array]:
 def critical_stiffness(loop: SampledLoop, b_d: float, least: float = 1.0) -> Array:
     """Smallest unstable k_r ≥ `least` [N/m] at every phase, with the phase frozen, shape (n,).
 
-    Infinite where the loop is stable up to `MOST_STIFFNESS`; `least` where it is unstable at `least` already.
+    Infinite where the loop is stable up to `MAX_STIFFNESS`; `least` where it is unstable at `least` already.
     """
-    return _smallest_unstable(lambda k_r: loop.radius(k_r, b_d), least, MOST_STIFFNESS)
+    return _smallest_unstable(lambda k_r: loop.radius(k_r, b_d), least, MAX_STIFFNESS)
 
 
 def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
     """Smallest unstable b_d ≥ `least` [N s/m] at every phase, with the phase frozen, shape (n,)."""
-    return _smallest_unstable(lambda b_d: loop.radius(k_r, b_d), least, MOST_DAMPING)
+    return _smallest_unstable(lambda b_d: loop.radius(k_r, b_d), least, MAX_DAMPING)
 
 
 def _smallest_unstable(radius: Callable[[float | Array], Array], least: float, most: float) -> Array:
     """First gain between `least` and `most` with a spectral radius of 1 at each phase: a grid, then 24 bisections."""
-    grid = np.geomspace(least, most, GRID)
+    grid = np.geomspace(least, most, GAIN_GRID)
     low, high = _bracket_onset(np.array([radius(gain) < 1.0 for gain in grid]), grid)
     for _ in range(24):
         middle = np.sqrt(low * np.minimum(high, most))
@@ -108,14 +110,14 @@ def _smallest_unstable(radius: Callable[[float | Array], Array], least: float, m
 
 
 def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
-    """Additional delay [s] at which the loop first becomes unstable at some phase; inf beyond `LATEST` periods."""
+    """Additional delay [s] at which the loop first becomes unstable at some phase; inf beyond `MAX_MARGIN_PERIODS`."""
     period, delay = loop.sampling.period, loop.sampling.delay
 
     def stable(extra: float) -> bool:
         later = SampledLoop(loop.linear, replace(loop.sampling, delay=delay + extra))
         return bool(later.radius(k_r, b_d).max() < 1.0)
 
-    steps = 0.25 * period * np.arange(int(4.0 * min(LATEST, MOST_PERIODS - delay / period)))
+    steps = 0.25 * period * np.arange(int(4.0 * min(MAX_MARGIN_PERIODS, MAX_DELAY_PERIODS - delay / period)))
     first = next((extra for extra in steps if not stable(float(extra))), np.inf)
     if first == 0.0 or np.isinf(first):
         return float(first)
@@ -143,7 +145,7 @@ class _HandResults(NamedTuple):
     bound : float
         Largest spectral radius at a phase plus its change to the next phase.
     cut : float
-        Largest spectral radius with the gains reduced to one of `CUTS`.
+        Largest spectral radius with the gains reduced to one of `LIMITER_FACTORS`.
     multiplier : float or None
         Largest modulus of a Floquet multiplier of a lap; None if the hand is not carried round a closed curve.
     """
@@ -161,7 +163,7 @@ class _HandResults(NamedTuple):
 
     def change(self, periodic: bool) -> float:
         """Largest change of the critical k_r from a phase to the next [N/m]."""
-        here, following = neighbours(np.minimum(self.critical, MOST_STIFFNESS), periodic)
+        here, following = neighbours(np.minimum(self.critical, MAX_STIFFNESS), periodic)
         return float(np.abs(following - here).max())
 
 
@@ -171,7 +173,7 @@ def _evaluate_hands(river: River, hands: Sequence[HandImpedance]) -> _HandResult
     for hand in hands:
         loop = SampledLoop(river.still(hand), river.sampling)
         critical.append(_critical_stiffness_near(loop, river))
-        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in CUTS))
+        cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in LIMITER_FACTORS))
         here, following = neighbours(loop.radius(river.k_r, river.b_d), river.curve.periodic)
         bounds.append(float((np.maximum(following, here) + np.abs(following - here)).max()))
         if river.curve.periodic and river.law.carries:
@@ -204,25 +206,25 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     found = _evaluate_hands(river, hands)
     least, hand, at = found.worst(hands)
     own = max(river.k_r, _MIN_STIFFNESS)
-    margin = min(least, MOST_STIFFNESS) / own - 1.0
+    margin = min(least, MAX_STIFFNESS) / own - 1.0
     figures = _figures(river, found)
     assumptions = (
         "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
-        f"lower gains, down to {CUTS[0]:.0%} of them, and its slew is not reached",
+        f"lower gains, down to {LIMITER_FACTORS[0]:.0%} of them, and its slew is not reached",
         f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
     )
     critical = f"critical k_r = {least:.4g} N/m" if least > _MIN_STIFFNESS else "no k_r is low enough"
     summary = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; {critical} with {hand}"
     if least <= own:
-        return Verdict("refuted", f"unstable: {summary}", margin, assumptions, unstable_start(river, hand, at), figures)
-    doubt = _doubt(river, found, least)
+        return Verdict("refuted", f"unstable: {summary}", margin, assumptions, counterexample(river, hand, at), figures)
+    doubt = _reason_not_certified(river, found, least)
     if doubt is not None:
         return Verdict("unknown", f"{doubt}; {summary}", margin, assumptions, {}, figures)
     return Verdict("certified", f"stable: {summary}", margin, assumptions, {}, figures)
 
 
-def _doubt(river: River, found: _HandResults, least: float) -> str | None:
+def _reason_not_certified(river: River, found: _HandResults, least: float) -> str | None:
     """Reason why a river with k_r below the least critical value is not certified; None if it is."""
     if found.multiplier is not None and found.multiplier >= 1.0:
         return f"stable with the phase held, but a multiplier of the lap is {found.multiplier:.4g}"
@@ -251,7 +253,7 @@ def _figures(river: River, found: _HandResults) -> dict[str, object]:
     }
 
 
-def unstable_start(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
+def counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
     """Counterexample of a river that is unstable at one of its phases: phase, place, hand, state ξ and growth rate.
 
     Parameters

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.interrupts import heeding_interrupts
+from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.certificates.region.intervals import bounds
 from controllers.certificates.region.lyapunov import PARAMETERS, Axis, Cell, Form, decrease
 from controllers.state import Array
@@ -29,7 +29,7 @@ class Checked(NamedTuple):
     least: float
 
 
-@heeding_interrupts()
+@raise_lost_interrupts()
 def check_form(axis: Axis, form: Form, cell: Cell, counts: tuple[int, int, int, int]) -> Checked:
     """Check that a form decreases in a whole cell, divided into `counts` parts along each parameter.
 

@@ -34,11 +34,11 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.interrupts import heeding_interrupts
+from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.state import Array
 
-SERIES = 12  # terms of the exponential series over a period: the remainder is below 1e-9 while b_h T/μ < 1
-LENGTH = 0.01  # [m] scale of the forms, for conditioning
+TAYLOR_TERMS = 12  # terms of the exponential series over a period: the remainder is below 1e-9 while b_h T/μ < 1
+LENGTH_SCALE = 0.01  # [m] scale of the forms, for conditioning
 # Masses at which the optimisation requires the decrease (2 or 6 work too); the check requires it everywhere.
 MASSES = 3
 _MASS_SCALE, _DAMPING_SCALE, _STIFFNESS_SCALE = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
@@ -70,8 +70,8 @@ class Axis(NamedTuple):
     @property
     def scale(self) -> Array:
         """Units of the state in which forms are written, shape (size,)."""
-        speed = LENGTH * self.stiffness / self.damping
-        return np.array([LENGTH, speed, speed] + [LENGTH * self.stiffness] * self.delay)
+        speed = LENGTH_SCALE * self.stiffness / self.damping
+        return np.array([LENGTH_SCALE, speed, speed] + [LENGTH_SCALE * self.stiffness] * self.delay)
 
     def matrix(self, z: Any) -> list[list[Any]]:
         """A(μ) in units of `scale`, for z = (μ, b_h, k_h, w), symbols or numbers."""
@@ -81,7 +81,7 @@ class Axis(NamedTuple):
         columns: list[list[Any]] = []
         for e0, v0, f0 in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
             e, v, term_e, term_v = e0, v0, e0, v0
-            for order in range(1, SERIES + 1):
+            for order in range(1, TAYLOR_TERMS + 1):
                 push = f0 if order == 1 else 0.0
                 term_e, term_v = term_v * t / order, (push - spring * term_e - drag * term_v) * t / (order * mass)
                 e, v = e + term_e, v + term_v
@@ -239,20 +239,20 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
         "ipopt.max_iter": 200,
         "show_eval_warnings": False,
     }
-    with heeding_interrupts():
+    with raise_lost_interrupts():
         first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(
         [_initial_form(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
     )
-    with heeding_interrupts():
+    with raise_lost_interrupts():
         found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
     if found[-1] > -1e-3:
         return None
     sustained_level = sum(form.gains) / (2.0 * rate)
     goal = ca.substitute(size + PUSH_WEIGHT * sustained_level + 0.3 * barrier, s, ca.SX(0.0))
-    with heeding_interrupts():
+    with raise_lost_interrupts():
         second = ca.nlpsol("second", "ipopt", {"x": x, "f": goal}, options)
-    with heeding_interrupts():
+    with raise_lost_interrupts():
         values = np.array(second(x0=found[:-1])["x"]).ravel()
     found = form_of(values.tolist())
     return found._replace(

@@ -29,21 +29,21 @@ from controllers.state import Array
 # [m], [m/s] limits of a region, beyond which the bounds on the remainder grow too fast. The demo's region reaches
 # 5.0 mm and 0.125 m/s. With twice the first, or half the second, no form suits all its hands; with half the first it
 # reaches 2.7 mm.
-RADIUS, SPEED = 0.006, 0.25
+MAX_RADIUS, SPEED = 0.006, 0.25
 # Required rates of a form, as fractions of the slowest axis' own rate. With 0.7 alone the demo's region reaches 5.3 mm,
 # but the hand comes only within 2.2 mm, instead of 1.8.
-SHARES = (0.82, 0.6)
+RATE_FRACTIONS = (0.82, 0.6)
 # Fraction of the hands' intervals that is the firm part: the largest mass and damping, the smallest stiffness. It is
 # examined where no form suits all hands.
-FIRM = 0.2
+STIFF_HAND_FRACTION = 0.2
 LEVELS = 40  # grid of √V between 0 and 1; with 80 the demo's hand comes within 1.65 mm instead of 1.8
-HALF = 0.5  # level at which the remainder is reported if there is no region
-PARTS = (160, 8, 4, 1)  # parts of a cell of hands along μ, b_h, k_h, w
+REPORT_LEVEL = 0.5  # level at which the remainder is reported if there is no region
+CELL_COUNTS = (160, 8, 4, 1)  # parts of a cell of hands along μ, b_h, k_h, w
 # Fractions of the required rate that are tried, since the check needs a margin; the demo's region needs only the first.
-BACKED_OFF = (0.97, 0.93, 0.85)
+REDUCED_RATES = (0.97, 0.93, 0.85)
 
 
-class Found(NamedTuple):
+class CertifiedRegion(NamedTuple):
     """A checked form, its level ℓ, the level of the ball that is reached, and the remainder at ℓ."""
 
     form: Form
@@ -100,10 +100,10 @@ def _find_levels(
 
 def _check_reduced_rates(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Checked] | None:
     """The form with the largest of several reduced rates (and raised gains s_c) at which all parts of the cell pass."""
-    for share in BACKED_OFF:
+    for share in REDUCED_RATES:
         gains = tuple(gain / share for gain in form.gains)
         slower = form._replace(rate=share * form.rate, gains=gains)
-        result = check_form(axis, slower, cell, PARTS)
+        result = check_form(axis, slower, cell, CELL_COUNTS)
         if result.least > 0.0:
             return slower, result
     return None
@@ -112,8 +112,8 @@ def _check_reduced_rates(axis: Axis, form: Form, cell: Cell) -> tuple[Form, Chec
 class Search(NamedTuple):
     """Result: a form with an invariant set, and one that decreases for frozen inertia; None if there is none."""
 
-    found: Found | None
-    frozen: Found | None
+    found: CertifiedRegion | None
+    frozen: CertifiedRegion | None
 
 
 def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
@@ -124,16 +124,16 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
     river, axis
         The river, and one axis of its loop.
     tube : TubeBounds
-        Bounds of the device within `RADIUS`.
+        Bounds of the device within `MAX_RADIUS`.
     hands : HandRange
         Intervals of the hands; their masses add to the device's own.
     ceiling : float
         Ceiling of the limiter [N].
     """
-    frozen: Found | None = None
+    frozen: CertifiedRegion | None = None
     carries = river.law.carries
     course = Course.of(river.curve, river.law)
-    share = float(window((RADIUS / river.width) ** 2)) if carries else 1.0
+    share = float(window((MAX_RADIUS / river.width) ** 2)) if carries else 1.0
     low = np.array([tube.mass_low + hands.mass[0], hands.damping[0], hands.stiffness[0], share])
     high = np.array([tube.mass_high + hands.mass[1], hands.damping[1], hands.stiffness[1], 1.0])
     cell = Cell(low, high, tube.mass_high, tube.mass_low)
@@ -141,17 +141,21 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
     if slowest >= 1.0:
         return Search(None, None)
     steady = axis.damping * course.pace * hands.damping[1] / (axis.damping + hands.damping[1])
-    limits = Limits(min(ceiling, tube.motor_force) - steady, RADIUS, SPEED, _expected_forces(axis, cell, tube, course))
-    for part in SHARES:
+    limits = Limits(
+        min(ceiling, tube.motor_force) - steady, MAX_RADIUS, SPEED, _expected_forces(axis, cell, tube, course)
+    )
+    for part in RATE_FRACTIONS:
         form = find_form(axis, cell, limits, -part * np.log(slowest) / axis.period)
         passed = None if form is None else _check_reduced_rates(axis, form, cell)
         if passed is None:
             continue
         level, ball = _find_levels(axis, passed[0], cell, tube, course, share, limits)
-        rest = remainder(axis, passed[0], cell, tube, course, share, level or HALF)
+        rest = remainder(axis, passed[0], cell, tube, course, share, level or REPORT_LEVEL)
         if level > 0.0:
-            return Search(Found(*passed, cell, level, ball, rest), Found(*passed, cell, 1.0, 0.0, rest))
-        frozen = frozen or Found(*passed, cell, 1.0, 0.0, rest)
+            return Search(
+                CertifiedRegion(*passed, cell, level, ball, rest), CertifiedRegion(*passed, cell, 1.0, 0.0, rest)
+            )
+        frozen = frozen or CertifiedRegion(*passed, cell, 1.0, 0.0, rest)
     return Search(None, frozen)
 
 
@@ -184,10 +188,10 @@ def _firm_part(hands: HandRange) -> HandRange:
     """The part of the intervals with the largest mass and damping and the smallest stiffness."""
 
     def upper(low: float, high: float) -> tuple[float, float]:
-        return high - FIRM * (high - low), high
+        return high - STIFF_HAND_FRACTION * (high - low), high
 
     low, high = hands.stiffness
-    return HandRange(upper(*hands.mass), upper(*hands.damping), (low, low + FIRM * (high - low)))
+    return HandRange(upper(*hands.mass), upper(*hands.damping), (low, low + STIFF_HAND_FRACTION * (high - low)))
 
 
 def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
@@ -215,12 +219,14 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
         return Verdict("unknown", "a region is sought only about curves whose nearest point attracts, and points")
     if river.sampling.rest_delay > 0.0 or river.k_r <= 0.0 or river.b_d <= 0.0:
         return Verdict("unknown", "a region needs a stiffness, a damping, and a delay of whole periods")
-    if min(0.4 * river.curve.reach, 0.8 * river.width) < RADIUS:
-        return Verdict("unknown", f"a region needs {1e3 * RADIUS:g} mm about the curve, too much for its bends or tube")
+    if min(0.4 * river.curve.reach, 0.8 * river.width) < MAX_RADIUS:
+        return Verdict(
+            "unknown", f"a region needs {1e3 * MAX_RADIUS:g} mm about the curve, too much for its bends or tube"
+        )
     sampling = river.sampling
     axis = Axis(river.k_r, river.b_d, sampling.period, sampling.keep, sampling.whole_delay, river.law.slides)
     try:
-        tube = tube_bounds(river.device, river.curve, RADIUS)
+        tube = tube_bounds(river.device, river.curve, MAX_RADIUS)
     except CertificateError as error:
         return Verdict("unknown", str(error))
     loosest = _loosest_hand(axis, tube, hands)
@@ -241,7 +247,7 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
     return Verdict("unknown", reason, None, ASSUMPTIONS, {}, figures)
 
 
-def _description(axis: Axis, found: Found) -> str:
+def _description(axis: Axis, found: CertifiedRegion) -> str:
     offset, speed = found.offsets(axis)
     return (
         f"from {1e3 * offset:.3g} mm off the curve, or {speed:.3g} m/s from its pace, the hand comes within "
@@ -257,7 +263,7 @@ def _hands_text(hands: HandRange) -> str:
     )
 
 
-def _reason(frozen: Found | None, hands: HandRange) -> str:
+def _reason(frozen: CertifiedRegion | None, hands: HandRange) -> str:
     """Reason why the loosest hand alone has no certified region."""
     if frozen is None:
         return f"no Lyapunov function was found for {_hands_text(hands)} alone"
@@ -277,7 +283,7 @@ ASSUMPTIONS = (
 )
 
 
-def _figures(axis: Axis, found: Found) -> dict[str, object]:
+def _figures(axis: Axis, found: CertifiedRegion) -> dict[str, object]:
     offset, speed = found.offsets(axis)
     return {
         "distance": offset,
@@ -305,7 +311,7 @@ def _figures(axis: Axis, found: Found) -> dict[str, object]:
     }
 
 
-def _ellipses(axis: Axis, found: Found) -> Array:
+def _ellipses(axis: Axis, found: CertifiedRegion) -> Array:
     """Edges of region and ball over (e [m], ν = y [m/s]), for the lightest and the heaviest mass, (2, 2, n, 2)."""
     angle = np.linspace(0.0, 2.0 * np.pi, 97)
     circle = np.stack([np.cos(angle), np.sin(angle)])

@@ -6,7 +6,7 @@ It gives an input-to-state estimate of the whole loop. With ‖x‖ = √V ≤ �
 
 r is the form's rate and s_c its gains for the forces w_c; r_0 is the loss of rate due to the nonlinearity, δ the terms
 that neither vanish on the curve nor are forces. All of them grow with ℓ. Every term is an upper bound in the tube, for
-the form's worst mass and hand. Terms of second order in T are covered by the factor `SAFE`.
+the form's worst mass and hand. Terms of second order in T are covered by the factor `SECOND_ORDER_FACTOR`.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from controllers.state import Array
 
 # Factor for terms of second order in T. From 5 mm off the demo's curve a hand comes within 1.8 mm, with 1.1 too; with
 # 1 it comes within 1.65 mm.
-SAFE = 1.05
+SECOND_ORDER_FACTOR = 1.05
 DENSE = 120  # masses at which terms that are not convex in the mass are evaluated; half or twice certifies the same
 
 
@@ -160,7 +160,8 @@ def remainder(
         drift += pace_share**2 * course.acceleration * turn
         drift += second_bend * t * speed * pace * cross
     return Remainder(
-        rate=SAFE * rate, drift=SAFE * drift, newtons=SAFE * newtons, metric=SAFE * metric,
+        rate=SECOND_ORDER_FACTOR * rate, drift=SECOND_ORDER_FACTOR * drift,
+        newtons=SECOND_ORDER_FACTOR * newtons, metric=SECOND_ORDER_FACTOR * metric,
         shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
     )  # fmt: skip
 

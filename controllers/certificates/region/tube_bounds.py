@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from controllers.certificates.interrupts import heeding_interrupts
+from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.certificates.loop.device import Device, matrix, vector
 from controllers.certificates.region.intervals import bounds, spectral_bound
 from controllers.certificates.report import CertificateError
@@ -56,7 +56,7 @@ class TubeBounds(NamedTuple):
     motor_force: float
 
 
-@heeding_interrupts()
+@raise_lost_interrupts()
 def tube_bounds(device: Device, curve: Trajectory, radius: float) -> TubeBounds:
     """Bounds within a radius [m] of a curve.
 

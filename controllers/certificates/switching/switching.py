@@ -46,7 +46,7 @@ _MAX_COST_SLOPE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 
 
 
 @dataclass(frozen=True)
-class Sharing:
+class SelectionRule:
     """Parameters of `HigherOrder` that decide how rivers share the hand.
 
     Parameters
@@ -72,7 +72,7 @@ class Sharing:
 
 
 @dataclass(frozen=True)
-class Rival:
+class CompetingRiver:
     """A rival river j relative to a river i, at the n phases of i.
 
     Attributes
@@ -93,14 +93,14 @@ class Rival:
     width: float
 
 
-def rival(held: River, other: River) -> Rival:
+def rival(held: River, other: River) -> CompetingRiver:
     """Another river relative to `held`, at the phases of `held`."""
     points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
     phases, distance = closest_phases(other.curve.packed(), points)
     other_velocity = other.curve.velocity(phases)
     speed = np.linalg.norm(other_velocity, axis=1)
     along = np.einsum("ni,ni->n", velocity, other_velocity) / speed
-    return Rival(
+    return CompetingRiver(
         distance=distance, least=np.abs(along - speed), width=other.width,
         angle=np.arccos(np.clip(along / np.linalg.norm(velocity, axis=1), -1.0, 1.0)),
     )  # fmt: skip
@@ -127,15 +127,15 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
-class Keeping:
+class HandRetention:
     """One river of a bundle with the others as rivals: bounds under which it keeps its hand."""
 
     held: River
     others: tuple[River, ...]
-    sharing: Sharing
+    sharing: SelectionRule
 
     @cached_property
-    def rivals(self) -> tuple[Rival, ...]:
+    def rivals(self) -> tuple[CompetingRiver, ...]:
         """The other rivers relative to this one."""
         return tuple(rival(self.held, other) for other in self.others)
 
@@ -214,7 +214,7 @@ class Keeping:
         return low
 
 
-def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
+def hysteresis_dwell(keepings: Sequence[HandRetention], push: float) -> float:
     r"""Lower bound [s] of the time between two changes, within `CORE` of a tube's radius of the curves.
 
     .. math:: \tau_d = \frac{h - 2 (\nu + c\,\delta)}{a + c\,|e|}, \qquad
@@ -245,7 +245,7 @@ def hysteresis_dwell(keepings: Sequence[Keeping], push: float) -> float:
 
 
 def switching(
-    keepings: Sequence[Keeping], push: float, ceiling: float, found: Mapping[str, object], common: Common | None
+    keepings: Sequence[HandRetention], push: float, ceiling: float, found: Mapping[str, object], common: Common | None
 ) -> Verdict:
     """Verdict on the switching of a bundle's rivers, for hands that push with at most `push` newtons.
 

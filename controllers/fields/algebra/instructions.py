@@ -57,14 +57,14 @@ def empty_trace() -> Array:
 
 
 @njit
-def leave_trace(params: Array, curve: int, memory: Array, phase: float, distance: float, attractor: float) -> None:
+def write_trace(params: Array, curve: int, memory: Array, phase: float, distance: float, attractor: float) -> None:
     """Write the closest point of a curve to the trace, unless the trace has a nearer one."""
     if distance < memory[TRACE_DISTANCE]:
-        leave_place(memory, phase, curve_point(params, curve, phase), distance, attractor)
+        write_trace_point(memory, phase, curve_point(params, curve, phase), distance, attractor)
 
 
 @njit
-def leave_place(
+def write_trace_point(
     memory: Array, phase: float, place: tuple[float, float, float], distance: float, attractor: float
 ) -> None:
     """Write the nearest point of a law [m] to the trace, unless the trace has a nearer one."""

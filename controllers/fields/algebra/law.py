@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.checks import checked, of_kind
+from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.description import parts_of
@@ -60,7 +60,7 @@ class Law(ABC):
 
     def wrench(self, hand: HandState) -> Wrench:
         """Force and moment at one hand state, evaluated by the compiled laws as at the first tick of a run."""
-        of_kind("hand", hand, HandState)
+        check_kind("hand", hand, HandState)
         if (size := len(hand.vector())) != HAND_SIZE:
             raise ParameterError(f"the hand has {size} numbers; expected {HAND_SIZE}, of t, p, q, v, w and switch")
         program, wrench = self.program(), np.empty(6)
@@ -75,7 +75,7 @@ class Law(ABC):
 
     def __add__(self, other: "Law") -> "Program":
         """Sum of two fields."""
-        of_kind("the other field", other, Law)
+        check_kind("the other field", other, Law)
         first, second = self.program(), other.program()
         if second.depth == STACK > first.depth:  # evaluated second, it would overflow the stack
             first, second = second, first
@@ -93,12 +93,12 @@ class Law(ABC):
 
     def __sub__(self, other: "Law") -> "Program":
         """Difference of two fields."""
-        of_kind("the other field", other, Law)
+        check_kind("the other field", other, Law)
         return self + -other
 
     def __truediv__(self, divisor: float) -> "Program":
         """Field over a number."""
-        of_kind("a divisor of a field", divisor, float)
+        check_kind("a divisor of a field", divisor, float)
         if divisor == 0:
             raise ParameterError("a field was divided by 0; expected another number")
         return self * (1.0 / divisor)
@@ -111,13 +111,13 @@ class Law(ABC):
 
     def gated(self, weight: Weight) -> "Program":
         """Field times a weight: s F."""
-        of_kind("weight", weight, Weight)
+        check_kind("weight", weight, Weight)
         return self.program().followed(Join.GATE, weight.row)
 
     def blended(self, other: "Law", weight: Weight) -> "Program":
         """Blend of two fields: (1 − s) F + s F'."""
-        of_kind("other", other, Law)
-        of_kind("weight", weight, Weight)
+        check_kind("other", other, Law)
+        check_kind("weight", weight, Weight)
         return self.program().joined(other.program(), Join.BLEND, weight.row)
 
     def limited(self, force: float, torque: float = np.inf) -> "Program":
@@ -166,7 +166,7 @@ class MapFeed(NamedTuple):
         return self._replace(slot=self.slot + memory, at=self.at + params)
 
 
-class LawPlace(NamedTuple):
+class LawOffsets(NamedTuple):
     """Offsets of the numbers of a law in a program.
 
     Attributes
@@ -331,11 +331,11 @@ class Program(Law):
             memory[slot:first] = haptic_map.pose(stylus, map_memory)
             memory[first:last] = haptic_map.jacobian(stylus, map_memory).ravel()
 
-    def places(self) -> tuple[LawPlace, ...]:
+    def places(self) -> tuple[LawOffsets, ...]:
         """Offsets of the laws' parameters and memory, in the order of their instructions."""
         rows = self.ops[self.ops[:, OP_CODE] >= 0].tolist()
         return tuple(
-            LawPlace(law, row[OP_PARAMETERS], row[OP_MEMORY]) for law, row in zip(self.laws, rows, strict=True)
+            LawOffsets(law, row[OP_PARAMETERS], row[OP_MEMORY]) for law, row in zip(self.laws, rows, strict=True)
         )
 
     def composition(self) -> Iterator[tuple[Law | Join, Array]]:

@@ -1,7 +1,7 @@
 """Inputs of laws from a walker: at each tick it is advanced, and its state is written to the memory of the laws.
 
 The servo calls `feed_walkers` before `evaluate`. The walkers of a field are a state separate from its memory: laws only
-read their copy of it (`controllers.walking.walking.Followed`). A haptic map may read the walkers, too.
+read their copy of it (`controllers.walking.walking.WalkerState`). A haptic map may read the walkers, too.
 """
 
 from enum import IntEnum

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import checked, numbers_of, of_kind
+from controllers.checks import check_kind, checked, numbers_of
 from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
@@ -78,7 +78,7 @@ class Weight:
     @staticmethod
     def constant(s: float) -> "Weight":
         """Constant weight: any finite number, so that it can also scale a field or reverse its sign."""
-        of_kind("s", s, float)
+        check_kind("s", s, float)
         return _weight(_CONSTANT, s)
 
     @staticmethod
@@ -92,8 +92,8 @@ class Weight:
     @staticmethod
     def speed(low: float, high: float) -> "Weight":
         """0 up to the hand speed `low`, 1 from `high` on [m/s], with a smooth step between."""
-        of_kind("low", low, float)
-        of_kind("high", high, float)
+        check_kind("low", low, float)
+        check_kind("high", high, float)
         if not 0.0 <= low < high:
             raise ParameterError(f"speeds of a weight must be 0 ≤ low < high, got {low} and {high} m/s")
         return _weight(_SPEED, low, 1.0 / (high - low))

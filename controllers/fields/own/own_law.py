@@ -6,7 +6,7 @@ from typing import Any, overload
 
 import numpy.typing as npt
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law
 from controllers.fields.own.compiled_law import CompiledLaw
@@ -46,7 +46,7 @@ def law(function: _Function | None = None, *, compiled: bool = False) -> Any:
         If the function is called ``limited``, its first argument is not ``hand``, another argument has no number as its
         default, or it cannot be compiled.
     """
-    of_kind("compiled", compiled, bool)
+    check_kind("compiled", compiled, bool)
     if function is not None and not callable(function):
         raise ParameterError(f"a law is made from a function law(hand, …); got {function!r}")
     make = CompiledLaw if compiled else PythonLaw

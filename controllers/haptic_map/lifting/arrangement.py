@@ -116,7 +116,7 @@ class Task:
         return found
 
     def hand_motion(self, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
-        """Velocity and acceleration of the hand in the directions of r, θ and z, each (3, SAMPLES, n); see `on_lap`."""
+        """Velocity and acceleration of the hand along r, θ and z, each (3, SAMPLES, n); see `evaluate_sites`."""
         r, dr, dz, ddr, ddz = q[..., 0], dq[..., 0], dq[..., 1], ddq[..., 0], ddq[..., 1]
         w, a = self.rate, self.change
         velocity = np.stack([w * dr, w * r, w * dz])
@@ -151,10 +151,10 @@ _SLOPE_UNIT = SAMPLES * _LENGTH_UNIT**2
 
 def sites_of(controls: Array) -> Array:
     """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), from control points of the same shape."""
-    return on_lap(controls)[0][::_SAMPLES_PER_ROW]
+    return evaluate_sites(controls)[0][::_SAMPLES_PER_ROW]
 
 
-def on_lap(controls: Array) -> tuple[Array, Array, Array]:
+def evaluate_sites(controls: Array) -> tuple[Array, Array, Array]:
     """Sites at the samples of the lap and their first and second derivatives by θ, each (SAMPLES, n, 2)."""
     flat = controls.reshape(ROWS, -1)
     q, dq, ddq = ((matrix @ flat).reshape(SAMPLES, -1, 2) for matrix in _MATRICES)
@@ -177,7 +177,7 @@ class Energy:
         """E and its gradient at control points (ROWS · n · 2,)."""
         task = self._task
         controls = flat.reshape(ROWS, -1, 2)
-        q, dq, ddq = on_lap(controls)
+        q, dq, ddq = evaluate_sites(controls)
         apart, g_q = self._distance_terms(q)
         stiff = _BEND_WEIGHT / _SLOPE_UNIT * (1.0 + (task.rate[..., None] / _BEND_RATE) ** 4)
         bend, g_ddq = (stiff * ddq**2).sum(), 2.0 * stiff * ddq
@@ -268,7 +268,7 @@ def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
 
 def is_apart(task: Task, controls: Array) -> bool:
     """Whether sites keep the separation at every angle, and near their transitions half of the approach."""
-    q, _, _ = on_lap(controls)
+    q, _, _ = evaluate_sites(controls)
     n = q.shape[1]
     least = np.full((SAMPLES, n, n), task.separation)
     for first, second, near in task.windows():

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.blending.alignment import LARGEST_LEAD
+from controllers.blending.alignment import MAX_LEAD
 from controllers.easing import smooth_steps
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
 from controllers.motion.time_warping import least_cost_lead, smooth_lead
@@ -19,7 +19,7 @@ from controllers.state import Array
 SAMPLES = 385  # samples of a motion's features over its duration
 _STEPS = 96  # steps of the lap in the dynamic programme
 _LEADS_PER_STEP = 4  # leads per step: the pace changes by quarters of the clip's own
-_MAX_LEAD = int(LARGEST_LEAD * _STEPS * _LEADS_PER_STEP)
+_MAX_LEAD = int(MAX_LEAD * _STEPS * _LEADS_PER_STEP)
 _LEAD_CHANGES = (-2, -1, 0, 1, 2)  # possible changes of the lead in a step: paces 0.5 to 1.5
 # Largest change of the pace after smoothing. With half of it jump and backflip have their transition at 313° instead of
 # 146° and the condition number of h_* is up to 201 instead of 81; with twice up to 70, but in-betweens sink 4 mm into

@@ -14,7 +14,7 @@ motion by a tenth of a millimetre sideways in a fiftieth of a second would accel
 import numpy as np
 from numba import njit
 
-from controllers.curves.splines import round_lap
+from controllers.curves.splines import periodic_interpolation
 from controllers.easing import smooth_step
 from controllers.state import Array
 
@@ -27,7 +27,7 @@ _SAMPLES_PER_ROW = 4  # samples of a distance from one row to the next
 
 
 @njit
-def draw_in(r: float, z: float, sites: Array, slopes: Array, place: Array, change: Array) -> bool:
+def attract_to_core(r: float, z: float, sites: Array, slopes: Array, place: Array, change: Array) -> bool:
     """Draw a point towards the site whose core contains it; returns whether there is such a site.
 
     Parameters
@@ -65,7 +65,7 @@ def core_points(sites: Array) -> Array:
     never exceeds.
     """
     rows, m, _ = sites.shape
-    places = round_lap(sites, np.arange(_SAMPLES_PER_ROW * rows) * 2.0 * np.pi / (_SAMPLES_PER_ROW * rows))
+    places = periodic_interpolation(sites, np.arange(_SAMPLES_PER_ROW * rows) * 2.0 * np.pi / (_SAMPLES_PER_ROW * rows))
     least = np.full((_SAMPLES_PER_ROW * rows, m), np.inf)
     for i in range(m):
         distance = np.linalg.norm(places - places[:, i : i + 1], axis=2)

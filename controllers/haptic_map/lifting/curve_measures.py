@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, on_lap
+from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, evaluate_sites
 from controllers.haptic_map.lifting.transitions import Transition
 from controllers.state import Array
 
@@ -71,7 +71,7 @@ class ArrangementMeasure(NamedTuple):
 
 def measure(task: Task, controls: Array) -> ArrangementMeasure:
     """Measure an arrangement of control points (ROWS, n, 2)."""
-    q, dq, ddq = on_lap(controls)
+    q, dq, ddq = evaluate_sites(controls)
     n = q.shape[1]
     angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
     r, z, c, s = q[..., 0], q[..., 1], np.cos(angle)[:, None], np.sin(angle)[:, None]

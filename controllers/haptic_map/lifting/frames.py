@@ -20,7 +20,14 @@ from scipy.interpolate import CubicSpline
 from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.motion.channels import closing_signs, normalise, signed_like
-from controllers.motion.loops import drift_of, placed_at_origin, plane_exponential, remainder, turned, yawed
+from controllers.motion.loops import (
+    drift_of,
+    periodic_remainder,
+    placed_at_origin,
+    plane_exponential,
+    rotate_about_vertical,
+    rotate_in_plane,
+)
 from controllers.state import Array
 
 CLOSES = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
@@ -121,7 +128,7 @@ def checked_angles(angles: Array, frames: int, closed: bool, name: str) -> Array
 
 def closing_gap(poses: Array) -> float:
     """Largest difference of the last from the first remainder of a clip (n, nq), in a position or quaternion."""
-    ends = remainder(poses, np.linspace(0.0, 1.0, len(poses)), drift_of(poses))[[0, -1]]
+    ends = periodic_remainder(poses, np.linspace(0.0, 1.0, len(poses)), drift_of(poses))[[0, -1]]
     first, last = ends[:, 3:].reshape(2, -1, 4)
     turned_back = np.abs(signed_like(last, first) - first).max()
     return float(max(turned_back, np.abs(ends[1, :3] - ends[0, :3]).max()))
@@ -155,14 +162,14 @@ class PlacedClip:
         drift = drift_of(placed)
         # At the angle θ₀ the drift has already moved the figure by the share θ₀/2π of a lap.
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
-        placed[:, :2] = turned(heading, placed[:, :2]) + shift
-        placed[:, 3:7] = yawed(heading, placed[:, 3:7])
+        placed[:, :2] = rotate_in_plane(heading, placed[:, :2]) + shift
+        placed[:, 3:7] = rotate_about_vertical(heading, placed[:, 3:7])
         return PlacedClip(placed, angles, closed, drift)
 
     @property
     def remainder(self) -> Array:
         """ρ and the joints at the frames, shape (n, nq)."""
-        return remainder(self.poses, self.angles / _TURN, self.drift)
+        return periodic_remainder(self.poses, self.angles / _TURN, self.drift)
 
 
 def lap_spline(angles: Array, channels: Array, rotations: int, closed: bool) -> tuple[Array, Array, Array]:

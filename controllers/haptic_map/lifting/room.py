@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.checks import check_kinds, checked
+from controllers.checks import check_field_types, checked
 from controllers.curves.cylinder import checked_interval
 from controllers.errors import ParameterError
 from controllers.state import Array
@@ -66,7 +66,7 @@ class Room:
     acceleration: float = 8.0
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         checked_interval("r_range", self.r_range, 1e-3)
         checked_interval("z_range", self.z_range, -np.inf)
         checked("alike", self.alike, "", least=0.0)

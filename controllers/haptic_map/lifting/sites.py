@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.curves.splines import control_points, round_lap
+from controllers.curves.splines import control_points, periodic_interpolation
 from controllers.errors import ParameterError
 from controllers.state import Array
 
@@ -47,7 +47,7 @@ def checked_sites(sites: Array, names: tuple[str, ...], margin: float) -> Array:
             f"a curve comes to {1e3 * least:.2f} mm from the axis, where the phase is not defined; expected "
             f"{1e3 * (_MIN_RADIUS + margin):.2f} mm or more"
         )
-    places = round_lap(array, np.linspace(0.0, 2.0 * np.pi, 4 * len(array), endpoint=False))
+    places = periodic_interpolation(array, np.linspace(0.0, 2.0 * np.pi, 4 * len(array), endpoint=False))
     for i in range(len(names) - 1):
         distance = np.linalg.norm(places[:, i + 1 :] - places[:, i : i + 1], axis=2)
         if distance.min() < _MIN_DISTANCE:

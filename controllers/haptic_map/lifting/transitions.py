@@ -16,7 +16,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.lifting.motion_features import Features
 from controllers.state import Array, IntArray, Mask
 
-SAME = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
+SAME_POSE_DISTANCE = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
 # [rad] least distance between two transitions of one clip. With half of it backflip has transitions to both jump and
 # walk, 63° apart, and the condition number of h_* is up to 132 instead of 81; twice changes nothing.
 _MIN_ANGLE_APART = 1.2
@@ -134,7 +134,7 @@ def compare(moments: list[Features], inside: Mask, laps: Array) -> Comparison:
 def same_motions(compared: Comparison) -> list[tuple[int, int]]:
     """Pairs of clips with the same motion all round the lap."""
     mean = np.hypot(compared.pose, compared.velocity).mean(axis=0) / np.sqrt(2.0)
-    return [(i, j) for j in range(len(mean)) for i in range(j) if mean[i, j] < SAME]
+    return [(i, j) for j in range(len(mean)) for i in range(j) if mean[i, j] < SAME_POSE_DISTANCE]
 
 
 def find_transitions(compared: Comparison, most: float) -> list[Transition]:

@@ -7,9 +7,9 @@ import viser
 
 from experiments.config.modes import StretchThenFollow
 from experiments.live.panels import Acts
-from experiments.live.session.desk import REMEMBERED, Desk
+from experiments.live.session.desk import HISTORY_DURATION, Desk
 
-PACES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
+PLAYBACK_RATES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
 
 
 class ClockPanel:
@@ -35,10 +35,10 @@ class ClockPanel:
         self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
         self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
-        self._pace = gui.add_dropdown("Pace", tuple(PACES))
+        self._pace = gui.add_dropdown("Pace", tuple(PLAYBACK_RATES))
         self._look_back = gui.add_slider(
             "Look back [s]",
-            -REMEMBERED,
+            -HISTORY_DURATION,
             0.0,
             0.1,
             0.0,
@@ -51,7 +51,7 @@ class ClockPanel:
         self._perform.on_click(acts(lambda event: desk.perform(not self._is_performing)))
         self._time.on_click(acts(lambda event: self._on_time()))
         self._edit.on_click(acts(lambda event: desk.undo() if self._edit.value == "Undo" else desk.redo()))
-        self._pace.on_update(acts(lambda event: desk.pace(PACES[self._pace.value])))
+        self._pace.on_update(acts(lambda event: desk.pace(PLAYBACK_RATES[self._pace.value])))
         self._look_back.on_update(acts(lambda event: desk.pause(True)))
         self._resume.on_click(acts(lambda event: self._go_on_from_past()))
         self._rearm.on_click(acts(lambda event: desk.rearm()))

@@ -15,7 +15,7 @@ from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import Gain, gains_of
 
 COLORS = {"certified": "#1d8a3a", "refuted": "#c02020", "unknown": "#a8700a"}
-TYPING = 2.0  # [s] for which a number that differs from the gain stays in its field
+PENDING_EDIT_TIME = 2.0  # [s] for which a number that differs from the gain stays in its field
 _WORDS = {"certified": "stable", "refuted": "unstable", "unknown": "unknown"}
 
 
@@ -62,11 +62,11 @@ class GainsPanel:
             self._last_values[gain] = value
 
     def _differs_for_long(self, gain: Gain, shown: float) -> bool:
-        """Whether a slider has differed from its gain for `TYPING`; until then it may be typed, or not handled yet."""
+        """Whether a slider has differed from its gain for `PENDING_EDIT_TIME`; until then its edit may be pending."""
         now = time.monotonic()
         if self._differing.get(gain, (math.nan, 0.0))[0] != shown:
             self._differing[gain] = shown, now
-        return now - self._differing[gain][1] > TYPING
+        return now - self._differing[gain][1] > PENDING_EDIT_TIME
 
     def _slider_handler(self, gain: Gain, slider: Any) -> Callable[[Any], None]:
         def on_move(event: Any) -> None:

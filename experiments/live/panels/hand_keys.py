@@ -11,8 +11,8 @@ from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
 
 STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
-LETS_GO = "H"
-WAYS: dict[str, tuple[str, Array]] = {
+RELEASE_KEY = "H"
+KEY_DIRECTIONS: dict[str, tuple[str, Array]] = {
     "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
     "L": ("Hand to the right", np.array([1.0, 0.0, 0.0])),
     "I": ("Hand away", np.array([0.0, 1.0, 0.0])),
@@ -24,7 +24,7 @@ WAYS: dict[str, tuple[str, Array]] = {
 
 
 def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[], bool]) -> None:
-    """Let keys move the hand, which holds the stylus until `LETS_GO`; the first arguments are those of `ClockPanel`.
+    """Let keys move the hand, which holds the stylus until `RELEASE_KEY`; the first arguments are `ClockPanel`'s.
 
     Parameters
     ----------
@@ -35,6 +35,6 @@ def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[
     def handler(direction: Array) -> Callable[[Any], None]:
         return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * direction, pressed())
 
-    for key, (label, direction) in WAYS.items():
+    for key, (label, direction) in KEY_DIRECTIONS.items():
         gui.add_command(label, hotkey=key).on_trigger(acts(handler(direction)))  # pyright: ignore[reportArgumentType]
-    gui.add_command("Let go of the stylus", hotkey=LETS_GO).on_trigger(acts(lambda event: desk.let_go()))
+    gui.add_command("Let go of the stylus", hotkey=RELEASE_KEY).on_trigger(acts(lambda event: desk.let_go()))

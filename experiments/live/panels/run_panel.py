@@ -15,7 +15,7 @@ from experiments.live.session.desk import Desk
 from experiments.live.session.messages import Built
 from models.mocap.library import embedded_names
 
-FOR_EVER = 86400.0  # [s] longest session: a day
+MAX_SESSION_DURATION = 86400.0  # [s] longest session: a day
 SLOTS = {
     "cylindrical": ("inner low", "outer low", "inner high", "outer high"),
     "composite": ("lower body", "upper body inside", "upper body outside"),
@@ -69,7 +69,7 @@ class RunPanel:
         mode = str(self._mode.value)
         options: dict[str, Any] = {
             "figure": str(self._figure.value),
-            "seconds": FOR_EVER,
+            "seconds": MAX_SESSION_DURATION,
             "clips": self._clip_names(),
         }
         if mode == "lead":

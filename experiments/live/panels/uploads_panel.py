@@ -6,7 +6,7 @@ from typing import Any
 import viser
 
 from experiments.live.panels import Acts
-from experiments.live.session.desk import MOST_BYTES, Desk
+from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 
 
 class UploadsPanel:
@@ -19,7 +19,7 @@ class UploadsPanel:
             "feasible on contact, as `hvf prepare` does. It is then the first of the clips under *Play*."
         )
         self._upload = gui.add_upload_button(
-            f"Upload a motion (up to {MOST_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
+            f"Upload a motion (up to {MAX_UPLOAD_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
         )
         self._status = gui.add_markdown("", visible=False)
         self._bar = gui.add_progress_bar(100.0, visible=False, animated=True)

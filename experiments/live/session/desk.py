@@ -33,14 +33,14 @@ from experiments.live.session.messages import (
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from sim.errors import SimError
 
-REMEMBERED = 60.0  # [s] of history that can be viewed again
-PICTURES = 30.0  # states stored per second of history
-UNWATCHED = 60.0  # [s] without a browser after which a take is ended: longer than it takes to reload the page
-MOST_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
+HISTORY_DURATION = 60.0  # [s] of history that can be viewed again
+HISTORY_RATE = 30.0  # states stored per second of history
+UNATTENDED_TIMEOUT = 60.0  # [s] without a browser after which a take is ended: longer than it takes to reload the page
+MAX_UPLOAD_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
 _MOTION_SUFFIXES = (".bvh", ".amc", ".asf", ".txt", ".json")
 
 
-class Doing(NamedTuple):
+class UndoableAction(NamedTuple):
     """An action that can be undone: a change of gains, or, without configurations, a bend of the curve."""
 
     before: RunConfig | None = None
@@ -69,10 +69,10 @@ class Desk:
         self.builds = 0
         self.preparing: tuple[str, float] | None = None
         self.clips: dict[str, Path] = {}
-        self.history: deque[dict[str, Array]] = deque(maxlen=round(REMEMBERED * PICTURES))
+        self.history: deque[dict[str, Array]] = deque(maxlen=round(HISTORY_DURATION * HISTORY_RATE))
         self.now: dict[str, Array] = self.engine.shown.read()
-        self._undo_stack: list[Doing] = []
-        self._redo_stack: list[Doing] = []
+        self._undo_stack: list[UndoableAction] = []
+        self._redo_stack: list[UndoableAction] = []
         self._bend_count, self._expected_bends, self._watch_time = 0, 0, 0.0
         self._verdicts = Worker(verdicts)
         self._preparation: Worker | None = None
@@ -118,10 +118,10 @@ class Desk:
             self.history = deque((h for h in self.history if h["t"][0] <= now["t"][0]), maxlen=self.history.maxlen)
         bends = int(now["bends"][0])
         if bends > self._bend_count and bends > self._expected_bends:
-            self._undo_stack.append(Doing())
+            self._undo_stack.append(UndoableAction())
             self._redo_stack.clear()
         self._bend_count = self._expected_bends = bends
-        if not self.history or now["t"][0] - self.history[-1]["t"][0] >= 1.0 / PICTURES:
+        if not self.history or now["t"][0] - self.history[-1]["t"][0] >= 1.0 / HISTORY_RATE:
             if self.history and now["curve"][0] == self.history[-1]["curve"][0]:
                 now["course"] = self.history[-1]["course"]
             self.history.append(now)
@@ -214,15 +214,17 @@ class Desk:
         before, after = self.config, with_gain(self.config, name, value)
         if before == after:
             return
-        last = self._undo_stack[-1] if self._undo_stack else Doing()
+        last = self._undo_stack[-1] if self._undo_stack else UndoableAction()
         if last.after is before and self._changed_gains(last) == {name}:
-            self._undo_stack[-1] = Doing(last.before, after)  # successive moves of a slider are undone together
+            self._undo_stack[-1] = UndoableAction(
+                last.before, after
+            )  # successive moves of a slider are undone together
         else:
-            self._undo_stack.append(Doing(before, after))
+            self._undo_stack.append(UndoableAction(before, after))
         self._redo_stack.clear()
         self._apply_config(after)
 
-    def _changed_gains(self, doing: Doing) -> set[str]:
+    def _changed_gains(self, doing: UndoableAction) -> set[str]:
         if doing.before is None or doing.after is None:
             return set()
         before, after = vars(doing.before.mode), vars(doing.after.mode)
@@ -294,13 +296,13 @@ class Desk:
         self.engine.ask(Record(self.take(name)))
 
     def watched(self, browsers: int) -> None:
-        """Called periodically with the number of browsers; after `UNWATCHED` without one, a take is ended."""
+        """Called periodically with the number of browsers; after `UNATTENDED_TIMEOUT` without one, a take is ended."""
         now = time.monotonic()
         if browsers or not self.records:
             self._watch_time = now
-        elif now - self._watch_time > UNWATCHED:
+        elif now - self._watch_time > UNATTENDED_TIMEOUT:
             self._watch_time = now
-            self._say(f"The take was ended: for {UNWATCHED:g} s no browser had the page.")
+            self._say(f"The take was ended: for {UNATTENDED_TIMEOUT:g} s no browser had the page.")
             self.stop()
 
     def stop(self) -> None:
@@ -318,10 +320,10 @@ class Desk:
         file = Path(name).name
         if Path(file).suffix.lower() not in _MOTION_SUFFIXES:
             raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
-        if len(content) > MOST_BYTES:
+        if len(content) > MAX_UPLOAD_BYTES:
             raise SimError(
-                f"{file} has {len(content) / 1e6:.1f} MB; expected at most {MOST_BYTES / 1e6:.0f} MB; hvf prepare "
-                "takes larger ones"
+                f"{file} has {len(content) / 1e6:.1f} MB; expected at most {MAX_UPLOAD_BYTES / 1e6:.0f} MB; "
+                "hvf prepare takes larger ones"
             )
         if self.preparing is not None:
             raise SimError(f"{self.preparing[0]} is being prepared; expected one file after the other")

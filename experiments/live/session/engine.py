@@ -18,14 +18,14 @@ from sim.compilation.compiled import entry_point
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import make_logs
 from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
-from sim.loop.snapshots import KeptState, kept_state, put_back
+from sim.loop.snapshots import Snapshot, restore_snapshot, take_snapshot
 from sim.users.hand.dragged import dragged, relaxed, tremor
 
 BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short to be visible as a pause
-STRONGEST = 8.0  # [N] largest force of the hand, about the motors' peak force
-FASTEST = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
-HAND_TIME = 0.03  # [s] time constant with which the hand follows the mouse: two or three frames of the page
-KEPT_EVERY, KEPT = 1.0, 120  # [s] between stored states, and their largest number
+MAX_HAND_FORCE = 8.0  # [N] largest force of the hand, about the motors' peak force
+MAX_HAND_SPEED = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
+HAND_TIME_CONSTANT = 0.03  # [s] time constant with which the hand follows the mouse: two or three frames of the page
+SNAPSHOT_INTERVAL, MAX_SNAPSHOTS = 1.0, 120  # [s] between stored states, and their largest number
 
 
 @entry_point
@@ -79,8 +79,8 @@ class Engine:
         self.tick = 0
         self._end_parameter = self._find_end_parameter()
         self.perform(False)
-        self._initial_state = kept_state(self._servo, self.world, 0)
-        self._states: deque[KeptState] = deque([self._initial_state], maxlen=KEPT)
+        self._initial_state = take_snapshot(self._servo, self.world, 0)
+        self._states: deque[Snapshot] = deque([self._initial_state], maxlen=MAX_SNAPSHOTS)
 
     @property
     def period(self) -> float:
@@ -126,9 +126,9 @@ class Engine:
             self._intended_position[:] = np.nan
         else:
             start = self.stylus.copy() if np.isnan(self._intended_position[0]) else self._intended_position
-            share = 1.0 - np.exp(-seconds / HAND_TIME)
-            wanted = _clamp_to_ball(start + share * (self.drag.target - start), start, FASTEST * seconds)
-            end = _clamp_to_ball(wanted, self.stylus, STRONGEST / self._arm.stiffness)
+            share = 1.0 - np.exp(-seconds / HAND_TIME_CONSTANT)
+            wanted = _clamp_to_ball(start + share * (self.drag.target - start), start, MAX_HAND_SPEED * seconds)
+            end = _clamp_to_ball(wanted, self.stylus, MAX_HAND_FORCE / self._arm.stiffness)
             arm = dragged(self._arm, t, seconds, start + tremor(t), end + tremor(t + seconds), self.drag.pressed)
             self._intended_position = end
         device = self._device._replace(user=self._device.user._replace(arm=arm))
@@ -136,8 +136,8 @@ class Engine:
         run_block(self._servo._replace(device=device), self.tick, self._block, False, *self.logs)
         self._tick_times.append((time.thread_time() - begin) / self._block)
         self.tick += self._block
-        if self.time >= self._states[-1].tick * self.period + KEPT_EVERY:
-            self._states.append(kept_state(self._servo, self.world, self.tick))
+        if self.time >= self._states[-1].tick * self.period + SNAPSHOT_INTERVAL:
+            self._states.append(take_snapshot(self._servo, self.world, self.tick))
         return self.logs
 
     def cost(self) -> tuple[float, float]:
@@ -220,13 +220,13 @@ class Engine:
         self._restore(state)
         return self.time
 
-    def _restore(self, state: KeptState) -> None:
-        put_back(self._servo, self.world, state)
+    def _restore(self, state: Snapshot) -> None:
+        restore_snapshot(self._servo, self.world, state)
         self.tick = state.tick
         while len(self._states) > 1 and self._states[-1].tick > self.tick:
             self._states.pop()
         if self._states[0].tick > self.tick:
-            self._states = deque([state], maxlen=KEPT)
+            self._states = deque([state], maxlen=MAX_SNAPSHOTS)
         self.drag = None
         self._intended_position[:] = np.nan
 

@@ -48,11 +48,13 @@ from sim.hardware.undisturbed import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 
-PICTURE = 0.012  # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
-SLICE = 0.25  # [s] between two computations of the field slice
+MIN_FRAME_INTERVAL = (
+    0.012  # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
+)
+SLICE_INTERVAL = 0.25  # [s] between two computations of the field slice
 SLICE_WIDTH = 0.14  # [m] side of the slice
-IDLE = 0.01  # [s] between two polls of the page while nothing runs
-LATE = 0.1  # [s] of delay above which the loop does not catch up
+IDLE_POLL_INTERVAL = 0.01  # [s] between two polls of the page while nothing runs
+MAX_BACKLOG = 0.1  # [s] of delay above which the loop does not catch up
 
 
 class EngineProcess(PageProcess):
@@ -102,7 +104,7 @@ class _EngineLoop:
             paused, steps = held["paused"][0] > 0.0, held["steps"][0]
             if engine is None or (paused and steps <= self._steps_done):
                 self._steps_done = min(self._steps_done, steps)
-                time.sleep(IDLE)
+                time.sleep(IDLE_POLL_INTERVAL)
                 self._send_picture()
                 origin, elapsed = time.perf_counter(), 0.0
                 continue
@@ -117,7 +119,7 @@ class _EngineLoop:
             remaining = origin + elapsed - time.perf_counter()
             if remaining > 0.0:
                 time.sleep(remaining)
-            elif remaining < -LATE:
+            elif remaining < -MAX_BACKLOG:
                 origin, elapsed = time.perf_counter(), 0.0
         if self._engine is not None:
             self._stop(self._engine)
@@ -212,7 +214,7 @@ class _EngineLoop:
 
     def _send_picture(self) -> None:
         now, engine = time.perf_counter(), self._engine
-        if engine is None or now - self._last_picture_time < PICTURE:
+        if engine is None or now - self._last_picture_time < MIN_FRAME_INTERVAL:
             return
         servo = engine.session.servo
         self._last_picture_time = now
@@ -227,7 +229,7 @@ class _EngineLoop:
             "target": np.full(3, np.nan) if engine.drag is None else engine.drag.target,
             "ghost": self._ghost_pose(trace, servo.reference.pose),
         }  # fmt: skip
-        if now - self._last_slice_time > SLICE:
+        if now - self._last_slice_time > SLICE_INTERVAL:
             previous_time, previous_simulated = self._pace_sample
             shown["pace"] = 0.0 if previous_time == 0.0 else (engine.time - previous_simulated) / (now - previous_time)
             self._last_slice_time, self._pace_sample = now, (now, engine.time)

@@ -10,17 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.certificates.loop.governed import most_drag
+from controllers.certificates.loop.governed import max_drag
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.largest_gains import MOST_STIFFNESS
+from controllers.certificates.loop.largest_gains import MAX_STIFFNESS
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River, critical_stiffness, lap_multipliers
-from controllers.certificates.report import Outcome, Verdict, leaving_out
+from controllers.certificates.report import Outcome, Verdict, without_laws
 from controllers.errors import ControllerError
 from experiments.certify.certify import certified_rivers
 from experiments.config.run_config import RunConfig
-from experiments.setups.certified_law import certified_laws, governor_drag, left_out
+from experiments.setups.certified_law import certified_laws, governor_drag, uncertified_parts
 from sim.errors import SimError
 
 
@@ -67,7 +67,7 @@ class GainVerdicts:
                 reason = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
                 yield (GainVerdict("field", "unknown", reason, None, ""),)
                 return
-            rivers, drag, missing = certified_rivers(config), governor_drag(config), left_out(config)
+            rivers, drag, missing = certified_rivers(config), governor_drag(config), uncertified_parts(config)
         except (ControllerError, SimError) as error:
             yield (GainVerdict("field", "unknown", str(error), None, ""),)
             return
@@ -113,13 +113,13 @@ class GainVerdicts:
         if key not in self._critical:
             still, min_stiffness = self._river_loops(river)[0], max(river.k_r, _MIN_STIFFNESS)
             self._critical[key] = min(float(critical_stiffness(loop, river.b_d, min_stiffness).min()) for loop in still)
-        return verdict._replace(margin=min(self._critical[key], MOST_STIFFNESS) / max(river.k_r, _MIN_STIFFNESS) - 1.0)
+        return verdict._replace(margin=min(self._critical[key], MAX_STIFFNESS) / max(river.k_r, _MIN_STIFFNESS) - 1.0)
 
     def _governed_verdict(self, river: River, drag: float, field_verdict: GainVerdict) -> GainVerdict:
         """The verdict on a river with a governor of a given drag [N s/m], by the circle criterion alone."""
         if field_verdict.verdict != "certified":
             return field_verdict
-        certified_drag = min(most_drag(loop, river.k_r, river.b_d) for loop in self._river_loops(river)[0])
+        certified_drag = min(max_drag(loop, river.k_r, river.b_d) for loop in self._river_loops(river)[0])
         remark = f"governor of {drag:g} N s/m, certain up to {certified_drag:.3g}"
         margin = None if field_verdict.margin is None else min(field_verdict.margin, certified_drag / drag - 1.0)
         if certified_drag > drag:
@@ -138,7 +138,7 @@ class GainVerdicts:
 
 
 def _without_laws(verdict: GainVerdict, laws: Sequence[str]) -> GainVerdict:
-    combined = leaving_out(Verdict(verdict.verdict, verdict.reason), laws)
+    combined = without_laws(Verdict(verdict.verdict, verdict.reason), laws)
     return verdict._replace(verdict=combined.verdict, reason=combined.reason)
 
 

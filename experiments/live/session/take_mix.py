@@ -14,7 +14,7 @@ import numpy as np
 from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.state import Array
-from experiments.results.folder import RECORDING, animated
+from experiments.results.folder import RECORDING, has_animation
 from models.mocap.motion import quaternions
 from sim.errors import SimError
 from sim.recording.recording import Recording
@@ -65,7 +65,7 @@ class TakeData:
             If it holds no recording, or one without a figure.
         """
         with Recording(folder / RECORDING) as recording:
-            if not animated(recording):
+            if not has_animation(recording):
                 raise SimError(f"{folder}: was recorded without a figure; expected a take with one")
             stride = max(1, round(recording.rates["frames"] / FPS))
             poses = recording.channel("frames", "reference")[::stride]

@@ -25,7 +25,7 @@ from sim.recording.recording import Recording
 
 LIVE = "dragged by hand on the live page; no configuration says what the hand did"
 """Text ``live`` of a take's recording, which marks that it cannot be reproduced from its configuration."""
-LEAST = 0.5  # [s] shortest take that is measured; a shorter one is a mouse slip
+MIN_TAKE_DURATION = 0.5  # [s] shortest take that is measured; a shorter one is a mouse slip
 
 
 class Take:
@@ -92,11 +92,15 @@ class Take:
             (self.folder / RECORDING).unlink()
             with suppress(OSError):  # it may hold a user's files
                 self.folder.rmdir()
-            raise SimError(f"{self.folder}: time stood still, and nothing was recorded; expected {LEAST:g} s or more")
+            raise SimError(
+                f"{self.folder}: time stood still, and nothing was recorded; expected {MIN_TAKE_DURATION:g} s or more"
+            )
         self._recorder.flush()
-        if seconds < LEAST:
+        if seconds < MIN_TAKE_DURATION:
             self._recorder.close()
-            raise SimError(f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {LEAST:g} s or more")
+            raise SimError(
+                f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {MIN_TAKE_DURATION:g} s or more"
+            )
         parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled_spans))
         session = replace(engine.session, parts=parts)
         speed = SpeedSummary(seconds / (time.perf_counter() - self._wall_start), 0.0, peak_memory_mb())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.errors import ModelError
-from sim.hardware.undisturbed import parent_id, start_undisturbed
+from sim.hardware.undisturbed import parent_id, start_without_sigint
 
 _CHECK_INTERVAL = 0.5  # [s] between two checks that the page's process still exists
 
@@ -37,7 +37,7 @@ class PageProcess:
         self._answers: Any = context.Queue()
         queues = self._requests, self._answers
         self._process = context.Process(target=main, args=(*arguments, *queues), daemon=daemon, name=name)
-        start_undisturbed(self._process)
+        start_without_sigint(self._process)
 
     def ask(self, what: object) -> None:
         """Send a request."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.results.measures.blocks import ROWS
 from sim.recording.recording import Recording
-from sim.reference.transition import DWELL
+from sim.reference.transition import DWELL_TIME
 
 
 class RiverChange(NamedTuple):
@@ -33,7 +33,7 @@ def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
     """All changes of river in a run, in constant memory; none if the field has no named rivers.
 
     Not counted are the first river, a return to the same river after the hand was in none, and a stay that is shorter
-    than `sim.reference.transition.DWELL`, which a river's clip needs to be played.
+    than `sim.reference.transition.DWELL_TIME`, which a river's clip needs to be played.
     """
     if "river_names" not in recording.texts:
         return ()
@@ -50,7 +50,7 @@ def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
             if k >= 0:
                 current, since = float(rows[k]), float(times[k])
             lasted = float(times[end] if end < len(rows) else times[-1]) - since
-            if current < 0.0 or current == last or lasted < DWELL:
+            if current < 0.0 or current == last or lasted < DWELL_TIME:
                 continue
             if last >= 0.0:
                 changes.append(RiverChange(since, names[int(last)], names[int(current)]))

@@ -9,7 +9,7 @@ from controllers.state import Array
 from experiments.results.measures.summary_parts import FigureSummary
 from models.humanoid.skeleton import N_TANGENT
 from sim.body.falls import UP
-from sim.body.residual import SUPPORTS, ResidualMeasure
+from sim.body.residual import MIN_GROUND_FORCE, ResidualMeasure
 from sim.recording.recording import Recording
 
 
@@ -53,7 +53,7 @@ class FigureMeasure:
         falls = ~up & np.concatenate(([self._was_up], up[:-1]))
         self._falls += frames["t"][falls].tolist()
         self._was_up, self._frames, self._up = (bool(up[-1]), self._frames + len(up), self._up + int(np.sum(up)))
-        in_flight, supported = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > SUPPORTS
+        in_flight, supported = frames["flight"][up] > 0.0, frames["ground"][up][:, 2] > MIN_GROUND_FORCE
         residual = frames["residual"][up]
         self._joints.add(frames["joint_error"][up])
         self._root.add(frames["root_error"][up])

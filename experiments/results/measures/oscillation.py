@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.safety.oscillation import OscillationDetector, shaken
+from controllers.safety.oscillation import OscillationDetector, oscillating_ticks
 from controllers.state import Array, Mask
 from experiments.results.measures.blocks import BLOCK_ROWS
 from experiments.results.measures.figure_measure import MeanSquare
@@ -99,7 +99,7 @@ def oscillation_summary(recording: Recording) -> OscillationSummary:
     for first in range(0, n, BLOCK_ROWS):
         rows = slice(first, first + BLOCK_ROWS)
         force = np.nan_to_num(ticks["force"][rows])
-        found = shaken(detector, force, memory)
+        found = oscillating_ticks(detector, force, memory)
         p, nearest = ticks["p"][rows], ticks["nearest"][rows]
         measure.add(force, np.nan_to_num(p), np.nan_to_num(p - nearest), found)
         count += int(found.sum())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from controllers.state import Array, Mask
-from experiments.results.folder import animated, scene_of
+from experiments.results.folder import has_animation, scene_of
 from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
 from experiments.results.measures.changes import river_changes
@@ -33,8 +33,8 @@ Span = tuple[float, float]
 """Start and end of a span of time [s]."""
 
 SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
-HAND_AT_WORK = 1e-3  # [N] force above which the hand counts as pushing
-STANDS_WITHIN = 1e-3  # [m] of motion within which the stylus counts as standing still
+MIN_PUSH_FORCE = 1e-3  # [N] force above which the hand counts as pushing
+STANDSTILL_RADIUS = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
 _TICK_CHANNELS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
@@ -63,7 +63,7 @@ def summarise(
     handled : sequence of Span
         Times in which the hand does something other than pushing: it grabs, traces or leads.
     """
-    path, animation, figure, tank = measured(recording, default_poses, (0.0, math.inf), handled)
+    path, animation, figure, tank = measure_span(recording, default_poses, (0.0, math.inf), handled)
     return RunSummary(
         path, animation, figure, tank, speed, warnings, faults=fault_lines(recording), changes=river_changes(recording),
         oscillation=oscillation_summary(recording), trace=_replay_summary(recording),
@@ -71,7 +71,7 @@ def summarise(
     )  # fmt: skip
 
 
-def measured(
+def measure_span(
     recording: Recording, default_poses: Callable[[Array, Array, Array], Array], span: Span,
     handled: Sequence[Span] = (),
 ) -> tuple[PathSummary, AnimationSummary | None, FigureSummary | None, TankSummary]:  # fmt: skip
@@ -85,7 +85,7 @@ def measured(
         FigureMeasure(recording),
     )
     tank = TankSummary(math.inf, 0)
-    physical, shown = "joint_error" in recording.groups["frames"], animated(recording)
+    physical, shown = "joint_error" in recording.groups["frames"], has_animation(recording)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])
     rate, last = recording.rates["frames"], len(recording.channel("frames", "t"))
     begin, end = (last if at * rate >= last else math.ceil(at * rate - 1e-9) for at in span)
@@ -153,7 +153,7 @@ class PathMeasure:
     def add(self, ticks: Mapping[str, Array]) -> Mask:
         """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
-        at_work = size > HAND_AT_WORK
+        at_work = size > MIN_PUSH_FORCE
         last = np.maximum.accumulate(np.where(at_work, t, self._last_push_time))
         pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
         self._last_push_time = float(last[-1])
@@ -167,10 +167,10 @@ class PathMeasure:
         return pushed
 
     def _add_position(self, t: Array, p: Array) -> None:
-        """Update the time at which the stylus last moved by more than `STANDS_WITHIN`."""
+        """Update the time at which the stylus last moved by more than `STANDSTILL_RADIUS`."""
         k = 0
         while k < len(t):
-            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDS_WITHIN
+            far = np.linalg.norm(p[k:] - self._anchor, axis=1) > STANDSTILL_RADIUS
             if not far.any():
                 return
             k += int(np.argmax(far))

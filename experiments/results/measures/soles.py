@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from controllers.legs.sole_heights import STANDS
+from controllers.legs.sole_heights import STANCE_HEIGHT
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.world.scene import SceneConfig
@@ -20,7 +20,7 @@ class Soles:
         Least height of a point above the floor [m]; infinite before the first pose.
     """
 
-    def __init__(self, scene: SceneConfig, touch: float = STANDS):
+    def __init__(self, scene: SceneConfig, touch: float = STANCE_HEIGHT):
         self._contact_height = touch
         self._model = figure_model(scene.stature, scene.mass)
         self._data = mujoco.MjData(self._model)

@@ -10,7 +10,7 @@ from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, Stretc
 from controllers.state import Array
 from experiments.results.measures.blocks import ROWS
 from experiments.results.measures.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
-from experiments.results.measures.run_measures import Span, measured
+from experiments.results.measures.run_measures import Span, measure_span
 from sim.recording.recording import Channel, Recording
 
 _PRESS_CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")
@@ -23,7 +23,7 @@ def editing_summary(
 ) -> EditingSummary:  # fmt: skip
     """Measure the part of a run before the curve is performed; arguments as for `results.measures.summarise`."""
     span = (0.0, tubes.until)
-    path, animation, figure, _ = measured(recording, default_poses, span, handled)
+    path, animation, figure, _ = measure_span(recording, default_poses, span, handled)
     last = float(recording.channel("ticks", "t")[-1])
     presses = press_summaries(recording, tubes.curve, tubes.epsilon, tubes.until)
     until = tubes.until if np.isfinite(tubes.until) else None
@@ -38,7 +38,7 @@ def performance_summary(
     last = float(recording.channel("ticks", "t")[-1])
     if last <= tubes.until:
         return None
-    path, animation, figure, _ = measured(recording, default_poses, (tubes.until, np.inf), handled)
+    path, animation, figure, _ = measure_span(recording, default_poses, (tubes.until, np.inf), handled)
     return PerformanceSummary(tubes.until, last - tubes.until, path, animation, figure)
 
 

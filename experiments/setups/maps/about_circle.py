@@ -5,9 +5,9 @@ from functools import cache, partial
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
-from controllers.motion.strides import in_step
+from controllers.motion.strides import fit_to_lap
 from controllers.state import Array
-from experiments.fitting.blendable import closed_loops, grounded, keeps_pace, not_blendable, off_pace, same
+from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendable, off_pace, same, timing_clip
 from experiments.setups.maps.place import Place
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
@@ -22,11 +22,11 @@ def about_circle(
     """Map parts of a map of clips about a circle.
 
     `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights
-    (`grounded`).
+    (`timing_clip`).
     """
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
-    off = off_pace(played, made.loops, curve.duration, made.laps, grounded(clips) if timing is None else timing)
+    off = off_pace(played, made.loops, curve.duration, made.laps, timing_clip(clips) if timing is None else timing)
     return ClipMapParts(
         haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
@@ -60,4 +60,4 @@ def out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
     `count` is the number of clips that the map takes; if there are fewer, they are repeated.
     """
     played = [clips[i % len(clips)] for i in range(count)]
-    return not same(clips) and not keeps_pace(played, in_step(closed_loops(played), lap), lap)
+    return not same(clips) and not keeps_pace(played, fit_to_lap(closed_loops(played), lap), lap)

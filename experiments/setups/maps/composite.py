@@ -8,7 +8,7 @@ from controllers.haptic_map.composite import Composite as CompositeMap
 from experiments.config.maps import Composite
 from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.leg_choice import carried
+from experiments.fitting.leg_choice import select_legs
 from experiments.fitting.similarity import arms, carries_alike, upper_joints
 from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
 from experiments.setups.maps.place import Place, place_of
@@ -48,6 +48,6 @@ def composite_parts(
         if carries_alike(made, lap):
             return made, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
-        return carried(lambda _: only, [clips[0].name], lap, parallel)
+        return select_legs(lambda _: only, [clips[0].name], lap, parallel)
 
     return replace(about_circle(place, made, clips, timing=0), refined=refined)

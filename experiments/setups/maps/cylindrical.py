@@ -12,18 +12,18 @@ from controllers.legs.limbs import Limb
 from controllers.state import Array
 from experiments.config.maps import Cylindrical
 from experiments.config.run_config import RunConfig
-from experiments.files.array_cache import kept_array
-from experiments.fitting.balance import balanced
-from experiments.fitting.blendable import grounded, keep_own_pace, same
+from experiments.files.array_cache import cached_array
+from experiments.fitting.balance import with_balance
+from experiments.fitting.blendable import keep_own_pace, same, timing_clip
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.leg_choice import carried, unbearable
+from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, moves_alike
 from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
 from experiments.setups.maps.place import Place, place_of
 from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.parts.part_types import ClipMapParts
-from models.mocap.motion.clip import CLOSES, Clip
-from sim.compilation.sources import kept_folder
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
+from sim.compilation.sources import results_folder
 
 CORNERS = 4  # number of clips
 
@@ -54,19 +54,19 @@ def cylindrical_parts(
         return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
 
     def choose_legs() -> tuple[CylindricalMap, tuple[str, ...]]:
-        return carried(with_legs_of, [clip.name for clip in clips], lap, parallel)
+        return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
     if out_of_step(clips, len(motions), lap):
-        return replace(about_circle(place, with_legs_of(grounded(clips)), clips), refined=choose_legs)
+        return replace(about_circle(place, with_legs_of(timing_clip(clips)), clips), refined=choose_legs)
     made = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
         if same(clips):
-            balanced_map = balanced(made, figure, lap)
+            balanced_map = with_balance(made, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            as_prepared = clips[0].closes(CLOSES) and keep_own_pace(clips[:1], made.loops[:1], lap)
-            return balanced_map, () if as_prepared else unbearable(balanced_map, clips[0].name, lap, parallel)
-        return (balanced(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
+            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], made.loops[:1], lap)
+            return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
+        return (with_balance(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
 
     return replace(about_circle(place, made, clips), refined=refined)
 
@@ -82,6 +82,6 @@ def _cached_map(
 
     # The corrections do not depend on the radii and heights between which the clips blend.
     made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
-    folder = kept_folder(CylindricalMap.__module__)
-    corrections = kept_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    folder = results_folder(CylindricalMap.__module__)
+    corrections = cached_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
     return CylindricalMap(clips, radii, heights, legs, corrections, lap)

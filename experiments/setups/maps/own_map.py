@@ -9,7 +9,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from experiments.config.maps import Circle
-from experiments.setups.parts.pace import reached
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
 from models.humanoid.skeleton import N_POSE
 
@@ -34,6 +34,6 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
         raise ParameterError("a map of one's own has no rivers; expected another field")
 
     return ClipMapParts(
-        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=reached(curve), reach=Circle().radius, rivers=none,
+        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=check_reach(curve), reach=Circle().radius, rivers=none,
         river_pushes=none, course=lambda damping, stiffness: curve,
     )  # fmt: skip

@@ -6,7 +6,7 @@ from controllers.curves.cylinder import AXIS
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
-from experiments.setups.parts.pace import reached
+from experiments.setups.parts.pace import check_reach
 
 
 class Place(NamedTuple):
@@ -42,5 +42,5 @@ class Place(NamedTuple):
 def place_of(part: Cylindrical | Composite | RiverClips | MapFile) -> Place:
     """The place of a configured map; raises `SimError` if the Phantom does not reach its curve."""
     around = part.around
-    curve = reached(Trajectory.circle(around.radius, around.lap, wave=around.wave))
+    curve = check_reach(Trajectory.circle(around.radius, around.lap, wave=around.wave))
     return Place(curve, around.radius, part.reach, part.expressive)

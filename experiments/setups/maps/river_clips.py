@@ -7,11 +7,11 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
-from controllers.motion.strides import in_step
+from controllers.motion.strides import fit_to_lap
 from experiments.config.maps import RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.fitting.blendable import closed_loops, furthest_off, keep_own_pace, same
+from experiments.fitting.blendable import closed_loops, keep_own_pace, largest_pace_error, same
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
@@ -68,8 +68,8 @@ def _fit_round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bo
     loops = closed_loops(played)
     for laps in range(1, _MAX_LAPS + 1):
         for apart in (False, True):
-            fitted = in_step(loops, laps * lap, apart)
+            fitted = fit_to_lap(loops, laps * lap, apart)
             if keep_own_pace(played, fitted, laps * lap):
                 return laps, apart
-            best = min(best, (furthest_off(fitted, laps * lap), laps, apart))
+            best = min(best, (largest_pace_error(fitted, laps * lap), laps, apart))
     return best[1:]

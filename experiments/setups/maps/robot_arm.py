@@ -15,7 +15,7 @@ from controllers.state import Array
 from experiments.config.maps import RobotArm
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
-from experiments.setups.parts.pace import course_of, reached
+from experiments.setups.parts.pace import check_reach, course_of
 from experiments.setups.parts.part_types import ClipMapParts
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
 from models.world.scene import PEDESTAL
@@ -68,7 +68,9 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     SimError
         If the Phantom does not reach the curve.
     """
-    away = float(np.linalg.norm(reached(curve).point(np.linspace(curve.start, curve.end, _SAMPLE_COUNT)), axis=1).max())
+    away = float(
+        np.linalg.norm(check_reach(curve).point(np.linspace(curve.start, curve.end, _SAMPLE_COUNT)), axis=1).max()
+    )
     if scale * away > _TOOL_RANGE[0]:
         raise ParameterError(
             f"the curve goes {1e3 * away:.0f} mm from the origin of H, and the tool at most "

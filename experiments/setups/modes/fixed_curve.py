@@ -15,7 +15,7 @@ from experiments.config.run_config import RunConfig
 from experiments.results.measures.run_measures import trace_summary
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import tank_for
-from experiments.setups.parts.hands import handled, late_remark, resolved_user, turning_remark, user_hand
+from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
 from experiments.setups.parts.walls import figure_walls
 from sim.users.hand.actions import Push
@@ -77,7 +77,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
         course=field.course, user=user_hand(user, maps.curve, config.seconds, config.seed, field.other),
         tank=tank_for(power, field.springs, maps.reach, limiter),
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
-        argument_at=lambda nearest, phases: stylus_path(nearest), handled=handled(user),
+        argument_at=lambda nearest, phases: stylus_path(nearest), handled=handling_spans(user),
         remarks=turning_remark(user, maps.oriented) + late_remark(user, config.seconds),
         summarise=_add_trace if traces else lambda summary, of: summary,
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """FOLLOW as a run: one river along the map's curve."""
 
-from controllers.fields.follow import PACES
+from controllers.fields.follow import PACE_RANGE
 from controllers.fields.follow import Follow as FollowLaw
 from controllers.safety.energy_tank import river_power
 from experiments.config.modes import Follow
@@ -18,7 +18,7 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     course = maps.course(mode.damping, 0.0 if parallel else mode.stiffness)
     law = FollowLaw(course, mode.stiffness, mode.damping, mode.tube, parallel)
     law, urged = governed(mode.governor, law, course, maps)
-    power = river_power(mode.damping, (PACES[1] if parallel else 1.0) * fastest(course))
+    power = river_power(mode.damping, (PACE_RANGE[1] if parallel else 1.0) * fastest(course))
     springs = ((mode.stiffness, mode.tube),)
     field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
     return fixed_curve_parts(config, mode, maps, field)

@@ -14,7 +14,7 @@ from experiments.config.run_config import RunConfig
 from experiments.fitting.led_balance import led_gains
 from experiments.results.measures.lead_measures import lead_summary
 from experiments.results.measures.summary import RunSummary
-from experiments.setups.parts.budget import SPAN, fastest, tank_for
+from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.hands import participant
 from experiments.setups.parts.leading_hand import BEND, leading_hand, s_curve
 from experiments.setups.parts.led_figure import LedParts
@@ -39,7 +39,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     field, course = leading(mode, maps.gait), s_curve()
     config = replace(config, mode=replace(mode, floor_scale=field.walking.scale))
     limiter = ForceLimiter(config.clock.servo_period)
-    tank = tank_for(limiter.peak * fastest(course), ((np.inf, SPAN),), _START_RADIUS, limiter)
+    tank = tank_for(limiter.peak * fastest(course), ((np.inf, WORKSPACE_WIDTH),), _START_RADIUS, limiter)
     gait = field.walking.gait
     static = {"lead_scale": field.walking.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)

@@ -9,11 +9,11 @@ from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
 from experiments.config.modes import Rivers
-from experiments.setups.modes.rivers import BESIDE, river_time
+from experiments.setups.modes.rivers import SIDE_BY_SIDE_HYSTERESIS, river_time
 from experiments.setups.parts.budget import fastest
 from experiments.setups.parts.defaults import river_gains
-from experiments.setups.parts.hands import NEAR
-from experiments.setups.parts.pace import paced, reached
+from experiments.setups.parts.hands import PUSH_START_DISTANCE
+from experiments.setups.parts.pace import check_reach, paced
 from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
 from sim.users.hand.actions import Push
@@ -60,7 +60,7 @@ def lifted_curve(haptic_map: Lifted, curve: str) -> Trajectory:
     SimError
         If the Phantom does not reach it.
     """
-    return reached(haptic_map.curve(curve_number(haptic_map, curve)))
+    return check_reach(haptic_map.curve(curve_number(haptic_map, curve)))
 
 
 def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
@@ -80,7 +80,7 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
     """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
     pace = max(fastest(river.curve) for river in bundle.rivers)
-    return RiverChoice(bundle, given, pace, BESIDE * pace)
+    return RiverChoice(bundle, given, pace, SIDE_BY_SIDE_HYSTERESIS * pace)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:
@@ -155,4 +155,4 @@ def pushed_over(haptic_map: Lifted, first: int, second: int, angle: float, start
     distance = float(np.linalg.norm(displacement))
     x, y, z = (float(value) for value in displacement)
     p, q, r = (float(value) for value in place)
-    return Push(start, _PUSH_DURATION, _CROSSING_RATE * drag * distance, (x, y, z), (p, q, r), NEAR)
+    return Push(start, _PUSH_DURATION, _CROSSING_RATE * drag * distance, (x, y, z), (p, q, r), PUSH_START_DISTANCE)

@@ -10,13 +10,13 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.safety.energy_tank import river_power
-from experiments.config.modes import Rivers, gates
+from experiments.config.modes import Rivers, gates_rivers
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes.fixed_curve import FixedField, fixed_curve_parts
 from experiments.setups.parts.budget import fastest
 from experiments.setups.parts.defaults import river_gains
 from experiments.setups.parts.governor import governed, speeds_along
-from experiments.setups.parts.hands import SLOWEST
+from experiments.setups.parts.hands import MIN_PUSHED_RIVER_SPEED
 from experiments.setups.parts.pace import paced
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
 
@@ -26,14 +26,16 @@ ADMISSION, HYSTERESIS = 1.2, 0.15
 # [m/s] least hysteresis of rivers that cross, that of the encoders' noise: with less of it a push out of a river at
 # 32 mm/s changes over 20 times in 0.3 s instead of once (docs/validation/crossing-rivers.md).
 LEAST_HYSTERESIS = 0.01
-BESIDE = 0.05  # hysteresis over speed of rivers side by side, as on a lifted map: position tells them apart
+SIDE_BY_SIDE_HYSTERESIS = (
+    0.05  # hysteresis over speed of rivers side by side, as on a lifted map: position tells them apart
+)
 # In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
 # both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}
 # [s] time constant of the low-pass of the velocity that selects a river. Encoders make 10 mm/s of noise, more than the
 # smooth form's σ; without it a push changes river up to eight times instead of twice, laps of 8 s chatter without a
 # push, and laps of 14 s throw a relaxed hand out (docs/validation/crossing-rivers.md).
-LOOK = 8e-3
+SELECTION_TIME_CONSTANT = 8e-3
 GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
 WAVE = 0.6  # height of the wave as a share of the map's half width
 
@@ -42,7 +44,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "rivers"."""
     stiffness, damping = river_gains(mode)
     course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
-    if mode.governor is not None and gates(mode.crossing):
+    if mode.governor is not None and gates_rivers(mode.crossing):
         law = law_of(mode, gated(choice, maps), GATE)
     else:
         law, urged = governed(mode.governor, law_of(mode, choice), course, maps)
@@ -58,11 +60,12 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
 
 def slow_remark(pace: float) -> tuple[str, ...]:
     """Remark, if rivers of this speed [m/s] are too slow for a push from one into another."""
-    if pace >= SLOWEST:
+    if pace >= MIN_PUSHED_RIVER_SPEED:
         return ()
     return (
         f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slow, a push that takes it out of one takes it out of "
-        f"all, and --user push does not; above {1e3 * SLOWEST:.0f} mm/s it does (a shorter --lap, a larger --radius)",
+        f"all, and --user push does not; above {1e3 * MIN_PUSHED_RIVER_SPEED:.0f} mm/s it does (a shorter --lap, a "
+        "larger --radius)",
     )
 
 
@@ -85,7 +88,9 @@ def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> L
     bundle, _, pace, hysteresis = choice
     if mode.crossing == "sum":
         return bundle
-    return HigherOrder(bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis, mode.crossing, LOOK)
+    return HigherOrder(
+        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis, mode.crossing, SELECTION_TIME_CONSTANT
+    )
 
 
 def gated(choice: RiverChoice, maps: ClipMapParts) -> RiverChoice:

@@ -19,14 +19,14 @@ from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
-from experiments.setups.parts.budget import SPAN, fastest, tank_for
-from experiments.setups.parts.clips import BLINK
+from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
+from experiments.setups.parts.clips import MIN_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.hands import (
     PAUSE,
     edited_until,
     first_pushed_lap,
-    handled,
+    handling_spans,
     resolved_user,
     turning_remark,
     user_hand,
@@ -109,7 +109,7 @@ def _make_parts(
     if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:
         remarks = (f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that",)
     # A press of the switch replaces the seeking spring by the rubber; its energy is allowed once a second.
-    springs = ((max(seek, mode.rubber), SPAN), *performance.springs)
+    springs = ((max(seek, mode.rubber), WORKSPACE_WIDTH), *performance.springs)
     power = spring_store(mode.rubber, mode.rubber_tube) + performance.power
     notes = Notes(mode.kind.upper(), mode.rubber_tube, "tube", hand_does="traces" if user.traces else "grabs or pushes")
 
@@ -126,7 +126,7 @@ def _make_parts(
         program=with_walls(tubes.program(), mode.walls, maps), course=course,
         user=user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
-        gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handled(user), summarise=summarise,
+        gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handling_spans(user), summarise=summarise,
         # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
         remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.oriented),
@@ -141,7 +141,7 @@ def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ..
     over: list[str] = []
     for clip in clips:
         air = ~contacts(clip).supported
-        if max((end - start for start, end in spans(air)), default=0) <= BLINK * clip.fps:
+        if max((end - start for start, end in spans(air)), default=0) <= MIN_FLIGHT_DURATION * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.

@@ -19,7 +19,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.safety.energy_tank import EnergyTank, spring_store
 from controllers.safety.limiter import ForceLimiter
 
-SPAN = 0.2  # [m] by which a spring can be drawn: the width of the workspace
+WORKSPACE_WIDTH = 0.2  # [m] by which a spring can be drawn: the width of the workspace
 _MIN_BUDGET = 1e-3  # [W], [J] for a field without springs or dampers: quantised encoders falsify the measured work
 _SAMPLE_COUNT = 512  # samples of a curve in the search for its greatest speed
 
@@ -38,7 +38,9 @@ def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float,
     limiter : ForceLimiter
         Bounds the force of the device.
     """
-    stores = (sum(_spring_energy(spring, most, limiter.peak) for spring in springs) for most in (SPAN, start))
+    stores = (
+        sum(_spring_energy(spring, most, limiter.peak) for spring in springs) for most in (WORKSPACE_WIDTH, start)
+    )
     power, capacity, initial = (max(number, _MIN_BUDGET) for number in (power, *stores))
     drain_time = max(EnergyTank.drain_time, 2.0 * limiter.period)  # two periods are the least that a tank accepts
     return EnergyTank(limiter.period, power, capacity, drain_time, initial)

@@ -30,10 +30,14 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-NEAR = 3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
-SLOWEST = 0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
+PUSH_START_DISTANCE = (
+    3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
+)
+MIN_PUSHED_RIVER_SPEED = (
+    0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
+)
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
-TRACED = 0.01  # [s] between samples of a path that the hand traces
+TRACE_SAMPLE_TIME = 0.01  # [s] between samples of a path that the hand traces
 
 _CROSSING_PHASE = 0.5  # share of the lap at which the wave rises through the level river
 # [s] from the start of a push to the crossing, and its duration
@@ -136,8 +140,10 @@ def user_hand(
         intent = ChangeOver(other) if isinstance(intent, ChangeOver) else intent
         return participant(user.person, intent, curve, seconds, seed)
     if user.does == "trace":
-        times = np.arange(0.0, seconds + 2.0 * TRACED, TRACED)  # beyond the end, where a path rests
-        return Arm(path=curve.point(times), period=TRACED, pushes=user.pushes, turns=user.turns)
+        times = np.arange(
+            0.0, seconds + 2.0 * TRACE_SAMPLE_TIME, TRACE_SAMPLE_TIME
+        )  # beyond the end, where a path rests
+        return Arm(path=curve.point(times), period=TRACE_SAMPLE_TIME, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
 
 
@@ -171,7 +177,7 @@ def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
     return curve.duration + (edited_until(grabs) if grabs else 0.0)
 
 
-def handled(user: User) -> tuple[tuple[float, float], ...]:
+def handling_spans(user: User) -> tuple[tuple[float, float], ...]:
     """Intervals of time [s] in which a hand grabs or traces."""
     if user.traces:
         return ((0.0, np.inf),)
@@ -211,7 +217,7 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     At s times the default rivers' speed a push lasts 1/s times as long. Against a river's damping it then needs s times
     the force, and against its stiffness the same force, since distances are the same. In faster rivers, up to
     `_MAX_SCALED_SPEED`, damping dominates and the push gets s times the force; in slower ones it gets s^0.2 times the
-    force, between the two cases. There are no pushes in rivers slower than `SLOWEST`.
+    force, between the two cases. There are no pushes in rivers slower than `MIN_PUSHED_RIVER_SPEED`.
 
     Parameters
     ----------
@@ -222,7 +228,7 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
     """
     lap = curve.duration
     pace = curve.length / lap
-    if pace < SLOWEST:
+    if pace < MIN_PUSHED_RIVER_SPEED:
         return ()
     speed_ratio = min(pace, _MAX_SCALED_SPEED) / _REFERENCE_SPEED
     x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING_PHASE * lap - _LEAD_TIME / speed_ratio))
@@ -231,4 +237,6 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
         speed_ratio ** (1.0 if speed_ratio > 1.0 else _SLOW_FORCE_EXPONENT) * RIVER_PUSH,
     )
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
-    return tuple(Push(float(start), duration, force, (0.0, 0.0, 1.0), (x, y, z), NEAR) for start in starts)
+    return tuple(
+        Push(float(start), duration, force, (0.0, 0.0, 1.0), (x, y, z), PUSH_START_DISTANCE) for start in starts
+    )

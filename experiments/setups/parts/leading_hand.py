@@ -9,7 +9,7 @@ from controllers.state import Array
 from sim.users.hand.arm import Arm
 
 BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back
-PAUSE, BACK_PACE = 0.8, 0.5  # [s] of each pause; pace of the way back over the clip's own
+PAUSE, RETURN_RATE = 0.8, 0.5  # [s] of each pause; pace of the way back over the clip's own
 STIFFNESS = 150.0  # of the arm [N/m]: compliant enough to be guided
 _PERIOD, _RAMP_TIME = 0.01, 0.8  # [s] between the points of the hand's path, and of a ramp up or down of its pace
 _START_X, _END_X = -0.06, 0.08  # x of the ends of the S in H [m]
@@ -33,7 +33,7 @@ def leading_hand(field: Leading) -> Arm:
     seconds = field.walking.scale * curve.length / field.walking.gait.speed
     start, end = curve.point(curve.start), curve.point(curve.end)
     away = float(np.linalg.norm(end - start)) / curve.length
-    forth, back = _eased_progress(seconds), _eased_progress(seconds * away / BACK_PACE)
+    forth, back = _eased_progress(seconds), _eased_progress(seconds * away / RETURN_RATE)
     path = np.concatenate([
         np.tile(start, (round(PAUSE / _PERIOD), 1)), curve.point(curve.start + curve.duration * forth),
         np.tile(end, (round(PAUSE / _PERIOD), 1)), end + back[:, None] * (start - end),

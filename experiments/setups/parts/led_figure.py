@@ -16,14 +16,14 @@ from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.led_balance import balanced_on_ground
-from experiments.setups.parts.clips import BLINK, load_clips
+from experiments.setups.parts.clips import MIN_FLIGHT_DURATION, load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
 from models.humanoid.skeleton import CONTACT_RADIUS, proportion
 from models.mocap.dynamics.contacts import Contacts, contacts
-from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import spans
-from models.mocap.preparation.laps import lap_of
+from models.mocap.preparation.laps import best_lap
 from sim.world.world import FigureKind
 
 _PHASE_COUNT = 256  # samples of the stance over a lap: one in 4 ms for a lap of a second
@@ -90,7 +90,7 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    lap, closes = lap_of(clip), clip.closes(CLOSES)
+    lap, closes = best_lap(clip), clip.closes(CLOSURE_TOLERANCE)
     marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
     size, legs = proportion(figure), figure_legs(figure)
     clip, capture = lap.clip.resized(size), Capture(CONTACT_RADIUS * size)
@@ -120,7 +120,7 @@ def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Cap
 
 def lap_remark(clip: Clip, figure: FigureKind) -> tuple[str, ...]:
     """Remarks, if only a part of a clip is led, or if the clip does not repeat itself."""
-    lap, remarks = lap_of(clip), list[str]()
+    lap, remarks = best_lap(clip), list[str]()
     if lap.clip.n_frames < clip.n_frames:
         remarks.append(
             f"of the clip {clip.name!r} the lap that repeats itself best is led, {lap.start:.2f} to {lap.end:.2f} s"
@@ -138,7 +138,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
 
     Contact marks are cleaned in three steps. A foot that is up for less than `_MIN_SWING_TIME` stands throughout. Where
     no foot is settled, a foot that was in stance and is still planted stays in stance: it has not left the floor, but
-    sunk into it. A flight shorter than `BLINK` is ignored: the feet in stance before it stay in stance.
+    sunk into it. A flight shorter than `MIN_FLIGHT_DURATION` is ignored: the feet in stance before it stay in stance.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
@@ -152,7 +152,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
             if not stands[sample % n].any():
                 break
     for start, end in runs(~np.any(stands, axis=1)):
-        if end - start < BLINK * fps:
+        if end - start < MIN_FLIGHT_DURATION * fps:
             stands[np.arange(start, end) % n] = stands[start - 1]
     return stands
 

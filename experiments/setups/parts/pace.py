@@ -10,7 +10,7 @@ tenths of its speed needs eight tenths of gravity, and one whose pace changes by
 
 import numpy as np
 
-from controllers.checks import checked, of_kind
+from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.state import Array
@@ -116,7 +116,7 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     SimError
         If the Phantom does not reach the curve.
     """
-    of_kind("curve", curve, Trajectory)
+    check_kind("curve", curve, Trajectory)
     checked("stiffness", stiffness, "N/m", infinite=True)
     if checked("drag", drag, "N s/m") == 0.0:
         raise ParameterError(f"drag must be more than 0 N s/m, got {drag}: without it no field leads a hand at a pace")
@@ -132,7 +132,7 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)
 
 
-def reached(curve: Trajectory) -> Trajectory:
+def check_reach(curve: Trajectory) -> Trajectory:
     """The same curve, checked to lie within the Phantom's reach.
 
     Raises

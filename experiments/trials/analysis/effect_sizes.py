@@ -4,19 +4,19 @@ import numpy as np
 
 from controllers.state import Array
 
-ALIKE = 1e-6  # relative spread below which differences count as equal
+EQUAL_TOLERANCE = 1e-6  # relative spread below which differences count as equal
 
 
-def spreads(sample: Array) -> bool:
+def has_spread(sample: Array) -> bool:
     """Whether the values of a sample differ by more than rounding errors."""
-    return bool(np.ptp(sample) > ALIKE * np.max(np.abs(sample)))
+    return bool(np.ptp(sample) > EQUAL_TOLERANCE * np.max(np.abs(sample)))
 
 
 def cohen_dz(differences: Array) -> float:
     """Cohen's d_z: mean over standard deviation of paired differences (Cohen, *Statistical Power Analysis*, 1988)."""
     spread = float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
     mean = float(np.mean(differences)) if len(differences) else 0.0
-    return mean / spread if spread > ALIKE * abs(mean) else float("nan")
+    return mean / spread if spread > EQUAL_TOLERANCE * abs(mean) else float("nan")
 
 
 def hedges_g(one: Array, other: Array) -> float:

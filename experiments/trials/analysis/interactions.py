@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controllers.state import Array
-from experiments.trials.analysis.effect_sizes import spreads
+from experiments.trials.analysis.effect_sizes import has_spread
 
 
 def interactions_of(
@@ -71,7 +71,7 @@ def _p_value(cells: Any, inner: tuple[str, str, str], outer: tuple[str, str, str
         samples = tuple(differences[name].dropna().to_numpy() for name in outer[1:])
     else:
         samples = ((differences[outer[1]] - differences[outer[2]]).dropna().to_numpy(),)
-    if any(len(sample) < 3 for sample in samples) or not any(map(spreads, samples)):
+    if any(len(sample) < 3 for sample in samples) or not any(map(has_spread, samples)):
         return float("nan")
     test: Any = ttest_ind(*samples, equal_var=False) if between else ttest_1samp(samples[0], 0.0)
     return float(test.pvalue)

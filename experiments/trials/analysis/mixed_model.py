@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 _OPTIMISERS = ["bfgs", "lbfgs", "cg", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
 
 
@@ -49,7 +49,7 @@ class Fit(NamedTuple):
 NO_FIT = Fit(float("nan"), float("nan"), float("nan"), float("nan"), False)
 
 
-def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others: Sequence[str], freedom: int,
+def fit_mixed_model(rows: Any, measure: str, factor: str, levels: tuple[str, str], others: Sequence[str], freedom: int,
            within: bool) -> Fit:  # fmt: skip
     """Fit the model.
 
@@ -94,6 +94,6 @@ def fitted(rows: Any, measure: str, factor: str, levels: tuple[str, str], others
         return NO_FIT
     if not result.converged:
         return NO_FIT._replace(doubtful=True)
-    half_width = float(t.ppf(0.5 + 0.5 * LEVEL, freedom)) * standard_error
+    half_width = float(t.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, freedom)) * standard_error
     p = 2.0 * float(t.sf(abs(estimate) / standard_error, freedom))
     return Fit(estimate, estimate - half_width, estimate + half_width, p, False)

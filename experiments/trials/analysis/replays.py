@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from experiments.results.folder import RECORDING, world_of
 from experiments.trials.design.plan import Trial
 from experiments.trials.trial.measures import MEASURES
-from experiments.trials.trial.run_trial import Shelf, recorded
+from experiments.trials.trial.run_trial import MapCache, run_recorded
 from experiments.trials.trial.trial_log import TrialLog
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
@@ -53,8 +53,8 @@ def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay
 
 
 def _replay_page(trial: Trial) -> str:
-    session = Shelf().session(trial.config)
+    session = MapCache().session(trial.config)
     with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
-        recorded(trial.config, session, TrialLog(session.servo, session.world), Path(folder))
+        run_recorded(trial.config, session, TrialLog(session.servo, session.world), Path(folder))
         with Recording(Path(folder) / RECORDING) as recording:
             return replay_html(recording, world_of(recording))

@@ -13,7 +13,7 @@ from experiments.trials.analysis.statistics import Contrast, Statistics, statist
 from experiments.trials.analysis.tidy import measured_columns
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
-from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
+from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
 
 _CONTRASTS_FILE = "contrasts.csv"
 
@@ -38,7 +38,7 @@ def write_report(
     """
     import pandas as pd
 
-    measures = [name for name in measured_columns(frame) if name not in OF_CONDITIONS]
+    measures = [name for name in measured_columns(frame) if name not in CONDITION_MEASURES]
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from experiments.trials.analysis.effect_sizes import ALIKE
+from experiments.trials.analysis.effect_sizes import EQUAL_TOLERANCE
 from experiments.trials.analysis.statistics import Contrast, Statistics
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import MEASURES
@@ -18,7 +18,7 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     study, found : StudyConfig, Statistics
         The study and its contrasts.
     frame : pandas.DataFrame
-        Table made by `experiments.trials.analysis.tidy.table`.
+        Table made by `experiments.trials.analysis.tidy.trial_table`.
     failed : int
         Number of failed trials.
     """
@@ -67,7 +67,7 @@ def _comparison(c: Contrast) -> str:
     word = "lower" if c.difference < 0.0 else "higher"
     better = (c.difference < 0.0) == (MEASURES[c.measure].better == "less")
     agree = f", {c.agree} of {c.users} users" if c.agree else ""
-    varies = c.most - c.least > ALIKE * abs(c.difference)
+    varies = c.most - c.least > EQUAL_TOLERANCE * abs(c.difference)
     agree += f"; {_format_number(c.least)} to {_format_number(c.most)} by condition" if varies else ""
     return (
         f"{word} ({'better' if better else 'worse'}) with {c.level} than with {c.reference} ({pair}; {interval}{agree})"

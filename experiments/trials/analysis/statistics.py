@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from controllers.state import Array
-from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g, spreads
+from experiments.trials.analysis.effect_sizes import cohen_dz, has_spread, hedges_g
 from experiments.trials.analysis.interactions import interactions_of
-from experiments.trials.analysis.mixed_model import LEVEL, NO_FIT, Fit, fitted
+from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL, NO_FIT, Fit, fit_mixed_model
 
 RESAMPLES = 4999
 """Number of bootstrap resamples; (4999 + 1) × 2.5 % is whole, so that the ends of a percentile interval are resamples
@@ -77,7 +77,7 @@ class Contrast:
     def shown(self) -> bool:
         """Whether a difference is shown, by the interval and, if the model has one, by the corrected p."""
         apart = np.isfinite(self.low) and np.isfinite(self.high) and not self.low <= 0.0 <= self.high
-        return bool(apart and not self.p_holm >= 1.0 - LEVEL)
+        return bool(apart and not self.p_holm >= 1.0 - CONFIDENCE_LEVEL)
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def statistics(
     Parameters
     ----------
     frame : pandas.DataFrame
-        Table made by `experiments.trials.analysis.tidy.table`; failed trials are left out.
+        Table made by `experiments.trials.analysis.tidy.trial_table`; failed trials are left out.
     factors : mapping of str to sequence of str
         Names of levels by factor, the reference first.
     between : sequence of str
@@ -152,7 +152,7 @@ def _with_model(
     """The contrast with the results of the mixed model added."""
     groups = rows.groupby([name for name in varied if name in between]).ngroups if c.factor in between else 1
     others = [name for name in varied if name != c.factor]
-    fit: Fit = fitted(
+    fit: Fit = fit_mixed_model(
         rows, c.measure, c.factor, (c.level, c.reference), others, c.users - groups, c.factor not in between
     )
     remark = _NOT_CONVERGED_REMARK if fit.doubtful else _NO_MODEL_REMARK if not np.isfinite(fit.p) else ""
@@ -196,11 +196,13 @@ def _difference_range(table: Any, level: str, reference: str) -> tuple[float, fl
 def _bootstrap_interval(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
     from scipy.stats import bootstrap
 
-    if not (all(len(sample) > 2 for sample in samples) and any(map(spreads, samples))):
+    if not (all(len(sample) > 2 for sample in samples) and any(map(has_spread, samples))):
         return float("nan"), float("nan")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN, and is shown so
-        ends = bootstrap(samples, _difference, n_resamples=RESAMPLES, confidence_level=LEVEL, rng=rng, method="BCa")
+        ends = bootstrap(
+            samples, _difference, n_resamples=RESAMPLES, confidence_level=CONFIDENCE_LEVEL, rng=rng, method="BCa"
+        )
     return float(ends.confidence_interval.low), float(ends.confidence_interval.high)
 
 

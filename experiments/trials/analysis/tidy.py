@@ -6,14 +6,14 @@ from typing import Any
 
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import Trial
-from experiments.trials.trial.measures import MEASURES, OF_CONDITIONS
+from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
 from experiments.trials.trial.run_trial import Row
 
 TABLE_CSV, TABLE_PARQUET = "trials.csv", "trials.parquet"
 _INSTALL_HINT = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"
 
 
-def table(
+def trial_table(
     trials: Sequence[Trial], rows: Mapping[str, Row], measures: Sequence[str], margins: Mapping[int, float]
 ) -> Any:
     """The table as a pandas data frame, in the order of the plan; worker and time of a trial are not in it.
@@ -46,7 +46,9 @@ def table(
         meeting, row = trial.meeting, rows[trial.key]
         values = {name: row.measures.get(name, float("nan")) for name in measures}
         if row.state == "done":
-            values |= {name: margins.get(meeting.number, float("nan")) for name in OF_CONDITIONS if name in measures}
+            values |= {
+                name: margins.get(meeting.number, float("nan")) for name in CONDITION_MEASURES if name in measures
+            }
         record: dict[str, object] = {"key": trial.key, "user": meeting.user, **meeting.condition.levels}
         record |= {"repetition": meeting.repetition, "position": meeting.position, "seed": trial.config.seed}
         record |= {"state": row.state, "reason": row.reason, **values}

@@ -27,7 +27,7 @@ class Condition(NamedTuple):
     words: Words
 
 
-class Meeting(NamedTuple):
+class DesignTrial(NamedTuple):
     """A trial of the design: a user in a condition.
 
     Attributes
@@ -67,7 +67,7 @@ def conditions(study: StudyConfig) -> tuple[Condition, ...]:
     return tuple(combinations)
 
 
-def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
+def design_trials(study: StudyConfig) -> tuple[DesignTrial, ...]:
     """Every trial of a study, by user and then in the order of time.
 
     Users are assigned in turn to the groups of the between-subject factors. Within a group, the users take the rows of
@@ -88,18 +88,18 @@ def meetings(study: StudyConfig) -> tuple[Meeting, ...]:
             f"study {study.name!r}: {len(arms)} groups between users and {study.users.number} users; expected a user "
             f"or more for each, or fewer factors in between"
         )
-    trials: list[Meeting] = []
+    trials: list[DesignTrial] = []
     for user in range(study.users.number):
         members = arms[user % len(arms)]
-        rows = balanced_rows(len(members)) if study.order == "latin-square" else (tuple(range(len(members))),)
+        rows = balanced_latin_square(len(members)) if study.order == "latin-square" else (tuple(range(len(members))),)
         row = rows[user // len(arms) % len(rows)]
         for repetition, (place, k) in itertools.product(range(study.repetitions), enumerate(row)):
             number, condition = members[k]
-            trials.append(Meeting(user, repetition, repetition * len(row) + place, number, condition))
+            trials.append(DesignTrial(user, repetition, repetition * len(row) + place, number, condition))
     return tuple(trials)
 
 
-def balanced_rows(n: int) -> tuple[tuple[int, ...], ...]:
+def balanced_latin_square(n: int) -> tuple[tuple[int, ...], ...]:
     """Orders of n conditions in which each is in every position, and follows every other one, equally often.
 
     A Latin square for even n, two of them for odd n (E. J. Williams, "Experimental designs balanced for the estimation

@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import keywords
+from experiments.config.keywords import to_keywords
 from experiments.config.maps import MapFile
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.config.words import run_config
 from experiments.setups.parts.defaults import resolved
-from experiments.trials.design.design import Condition, Meeting, conditions, meetings
+from experiments.trials.design.design import Condition, DesignTrial, conditions, design_trials
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.study_config import StudyConfig, Words
 from models.mocap.library import embedded_names
@@ -44,11 +44,11 @@ class Trial(NamedTuple):
     """
 
     key: str
-    meeting: Meeting
+    meeting: DesignTrial
     config: RunConfig
 
 
-def planned(study: StudyConfig) -> tuple[Trial, ...]:
+def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
     """All trials of a study.
 
     Raises
@@ -60,21 +60,21 @@ def planned(study: StudyConfig) -> tuple[Trial, ...]:
     bases = {number: _base_config(study, people[0], condition) for number, condition in enumerate(conditions(study))}
     _check_distinct(study, bases)
     trials: list[Trial] = []
-    for meeting in meetings(study):
+    for meeting in design_trials(study):
         base = bases[meeting.number]
         user = replace(base.user, person=people[meeting.user])
         config = replace(base, user=user, seed=trial_seed(study.seed, meeting))
-        trials.append(Trial(key_of(config), meeting, config))
+        trials.append(Trial(trial_key(config), meeting, config))
     return tuple(trials)
 
 
-def trial_seed(seed: int, meeting: Meeting) -> int:
+def trial_seed(seed: int, meeting: DesignTrial) -> int:
     """Seed of a trial, independent of other trials' seeds and of the numbers of users and repetitions."""
     entropy = (seed, meeting.user, meeting.number, meeting.repetition)
     return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
 
 
-def key_of(config: RunConfig) -> str:
+def trial_key(config: RunConfig) -> str:
     """Hash of a configuration with its seed, of the files that it names, and of the code, 32 hex digits.
 
     Raises
@@ -130,7 +130,7 @@ def _base_config(study: StudyConfig, person: Person, condition: Condition) -> Ru
         return run_config(**words)
     except ParameterError as error:
         level_text = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
-        raise StudyError(f"study {study.name!r}, condition {level_text}: {keywords(str(error))}") from None
+        raise StudyError(f"study {study.name!r}, condition {level_text}: {to_keywords(str(error))}") from None
     except TypeError as error:
         raise StudyError(
             f"study {study.name!r}: {error}; expected words of a run, as `hvf run --help` has them"

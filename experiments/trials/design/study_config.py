@@ -8,12 +8,12 @@ from typing import Any, Literal, cast
 
 from pydantic import Field
 
-from experiments.config.part import above, from_dict, part, whole
+from experiments.config.part import above, from_dict, part, whole_number
 from experiments.trials.design.errors import StudyError
 
-MOST_TRIALS = 1_000_000
+MAX_TRIALS = 1_000_000
 """Maximum number of trials of a study or a tuning: the number of people in the largest population."""
-LONGEST = 86_400.0
+MAX_TRIAL_DURATION = 86_400.0
 """Maximum duration of a trial: a day [s]."""
 Words = dict[str, Any]
 """Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
@@ -33,8 +33,8 @@ class Users:
         Their task, as in ``hvf run --user``, unless a factor sets the word "user"; in the mode "lead" they lead.
     """
 
-    number: int = whole(1, default=12)
-    seed: int = whole(0, default=1)
+    number: int = whole_number(1, default=12)
+    seed: int = whole_number(0, default=1)
     does: str = "trace"
 
 
@@ -78,13 +78,13 @@ class StudyConfig:
     run: Words = Field(default_factory=dict)
     between: tuple[str, ...] = ()
     users: Users = Users()
-    repetitions: int = whole(1, default=1)
+    repetitions: int = whole_number(1, default=1)
     order: Literal["latin-square", "fixed"] = "latin-square"
     measures: tuple[str, ...] = ()
     ease: str = "tracking_error"
     cost: str = "expressiveness"
-    seconds: float = above(0.0, default=8.0, unit="s", most=LONGEST)
-    seed: int = whole(0, default=1)
+    seconds: float = above(0.0, default=8.0, unit="s", most=MAX_TRIAL_DURATION)
+    seed: int = whole_number(0, default=1)
     recordings: str = ""
 
     def with_users(self, number: int | None, seed: int | None) -> "StudyConfig":
@@ -93,7 +93,7 @@ class StudyConfig:
         return replace(self, users=users) if seed is None else replace(self, users=replace(users, seed=seed), seed=seed)
 
 
-def study_from(values: Mapping[str, object], where: str) -> StudyConfig:
+def parse_study(values: Mapping[str, object], where: str) -> StudyConfig:
     """A study from the entries of its file; a factor may be a list of values of the word after which it is named.
 
     Raises
@@ -125,15 +125,15 @@ def _parse_levels(name: str, levels: object) -> object:
 
 
 def check_trials(where: str, trials: int, made_of: str) -> None:
-    """Refuse more than `MOST_TRIALS` trials; `made_of` lists the factors of their number for the message.
+    """Refuse more than `MAX_TRIALS` trials; `made_of` lists the factors of their number for the message.
 
     Raises
     ------
     StudyError
         If there are more.
     """
-    if trials > MOST_TRIALS:
-        raise StudyError(f"{where}: {made_of} are too many; expected at most {MOST_TRIALS} trials")
+    if trials > MAX_TRIALS:
+        raise StudyError(f"{where}: {made_of} are too many; expected at most {MAX_TRIALS} trials")
 
 
 def read_toml(path: Path, what: str) -> dict[str, object]:

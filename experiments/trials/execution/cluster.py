@@ -9,12 +9,16 @@ from typing import Any
 from experiments.config.part import from_json
 from experiments.config.run_config import RunConfig
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.plan import key_of
-from experiments.trials.trial.run_trial import Row, Task, perform
+from experiments.trials.design.plan import trial_key
+from experiments.trials.trial.run_trial import Row, Task, perform_trial
 
-AHEAD = 3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
-DEATHS = 50  # number of workers that die while running the same trial before the trial is taken to be the cause
-STARTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
+TASKS_PER_THREAD = (
+    3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
+)
+MAX_WORKER_DEATHS = (
+    50  # number of workers that die while running the same trial before the trial is taken to be the cause
+)
+MAX_START_ATTEMPTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
 _LOCAL_TIMEOUT = "120s"  # timeout of local connections; processes on a busy machine may have to wait
 _MAX_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker
 
@@ -46,11 +50,11 @@ class Cluster:
         from distributed import as_completed
 
         pending, running = iter(tasks), as_completed()
-        for task in _take(pending, AHEAD * max(1, self._thread_count())):
+        for task in _take(pending, TASKS_PER_THREAD * max(1, self._thread_count())):
             running.add(self._submit(task))
         for future in running:
             yield self._row(future)
-            for task in _take(pending, 1 + max(0, AHEAD * self._thread_count() - running.count() - 1)):
+            for task in _take(pending, 1 + max(0, TASKS_PER_THREAD * self._thread_count() - running.count() - 1)):
                 running.add(self._submit(task))
 
     def _submit(self, task: Task) -> Any:
@@ -66,7 +70,7 @@ class Cluster:
             raise
         except KilledWorker:
             key = str(future.key).removeprefix("trial-")
-            return Row(key, "failed", f"every one of {DEATHS} workers that ran it died", {}, 0.0, "", "")
+            return Row(key, "failed", f"every one of {MAX_WORKER_DEATHS} workers that ran it died", {}, 0.0, "", "")
         except (OSError, TimeoutError, RuntimeError) as error:
             raise self._scheduler_error(error) from None
         except Exception as error:  # whatever a worker could not import or unpickle
@@ -105,7 +109,7 @@ def local_cluster(workers: int) -> Generator[Cluster]:
     import dask
 
     settings = {
-        "distributed.scheduler.allowed-failures": DEATHS, "distributed.worker.memory.terminate": False,
+        "distributed.scheduler.allowed-failures": MAX_WORKER_DEATHS, "distributed.worker.memory.terminate": False,
         "distributed.comm.timeouts.connect": _LOCAL_TIMEOUT, "distributed.comm.timeouts.tcp": _LOCAL_TIMEOUT,
     }  # fmt: skip
     with (
@@ -119,7 +123,7 @@ def local_cluster(workers: int) -> Generator[Cluster]:
 def _start_processes(distributed: Any, workers: int) -> Any:
     """Start Dask's local cluster, in several attempts, since Dask gives up if a worker dies while it starts."""
     reason = ""
-    for _ in range(STARTS):
+    for _ in range(MAX_START_ATTEMPTS):
         try:
             return distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=_LOG_LEVEL
@@ -174,7 +178,7 @@ def _import_distributed() -> Any:
 
 
 def perform_on_worker(task: Task) -> Row:
-    """Run `perform` on a worker, after checking that its code and files are those of the driver.
+    """Run `perform_trial` on a worker, after checking that its code and files are those of the driver.
 
     Raises
     ------
@@ -183,7 +187,7 @@ def perform_on_worker(task: Task) -> Row:
     """
     config = from_json(RunConfig, task.config, "a trial's configuration")
     try:
-        key = key_of(config)
+        key = trial_key(config)
     except StudyError as error:
         raise StudyError(f"worker on {socket.gethostname()}: {error}; copy it there, and start it again") from None
     if key != task.key:
@@ -191,7 +195,7 @@ def perform_on_worker(task: Task) -> Row:
             f"worker on {socket.gethostname()}: its code, libraries, clips or maps differ from the driver's; expected "
             "the same version of all, and start it again"
         )
-    return perform(task)
+    return perform_trial(task)
 
 
 def _take(tasks: Iterator[Task], number: int) -> Iterator[Task]:

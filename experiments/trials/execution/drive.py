@@ -13,7 +13,7 @@ from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.trials.design.plan import Trial
 from experiments.trials.execution.database import Database
-from experiments.trials.trial.run_trial import Row, Shelf, Task
+from experiments.trials.trial.run_trial import MapCache, Row, Task
 
 
 class Executor(Protocol):
@@ -31,7 +31,7 @@ class _RateColumn(ProgressColumn):
         return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
 
 
-def warm(configs: Iterable[RunConfig], shelf: Shelf, console: Console) -> None:
+def compile_and_make_maps(configs: Iterable[RunConfig], shelf: MapCache, console: Console) -> None:
     """Compile the units that trials need, once for each kind of run, and make their maps."""
     for config in {_compilation_key(config): config for config in configs}.values():
         shelf.session(config, compiler(console))

@@ -5,7 +5,7 @@ from experiments.trials.design.errors import StudyError
 _PROBE_FILE = ".hvf"
 
 
-def check_place(url: str) -> None:
+def check_writable(url: str) -> None:
     """Write an empty file to a folder or URL, and remove it again.
 
     Raises

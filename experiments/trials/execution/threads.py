@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
-from experiments.trials.trial.run_trial import Row, Task, perform
+from experiments.trials.trial.run_trial import Row, Task, perform_trial
 
-AHEAD = 2  # tasks queued for each thread, so that none is idle; more would only take memory
+TASKS_PER_THREAD = 2  # tasks queued for each thread, so that none is idle; more would only take memory
 
 
 class Threads:
@@ -31,8 +31,8 @@ class Threads:
         pool, waiting = ThreadPoolExecutor(self._number), set[Future[Row]]()
         try:
             for task in tasks:
-                waiting.add(pool.submit(perform, task))
-                if len(waiting) >= AHEAD * self._number:
+                waiting.add(pool.submit(perform_trial, task))
+                if len(waiting) >= TASKS_PER_THREAD * self._number:
                     done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                     yield from (future.result() for future in done)
             while waiting:

@@ -3,16 +3,16 @@
 from typing import Annotated
 
 from controllers.errors import ParameterError
-from experiments.config.part import part, whole
+from experiments.config.part import part, whole_number
 
 
 @part
 class Where:
     """Where trials run: one of three."""
 
-    threads: Annotated[int | None, whole(1)] = None
+    threads: Annotated[int | None, whole_number(1)] = None
     """Trials at a time in this process; by default as many as there are processors."""
-    workers: Annotated[int | None, whole(1)] = None
+    workers: Annotated[int | None, whole_number(1)] = None
     """Run them in so many processes of a local Dask cluster instead."""
     cluster: str | None = None
     """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""

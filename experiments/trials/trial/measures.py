@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from controllers.state import Array, Mask
-from experiments.config.run_config import PERSONAL, RunConfig
+from experiments.config.run_config import PERSON_INTENTS, RunConfig
 from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
 from experiments.results.measures.run_measures import SETTLING
 from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
@@ -20,9 +20,9 @@ from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.trials.trial.trial_log import TrialLog
 from sim.body.falls import UP
-from sim.body.residual import SUPPORTS
+from sim.body.residual import MIN_GROUND_FORCE
 
-SEEN_RATE = 25.0  # [Hz] at which animations are compared: about what the eye resolves
+COMPARISON_RATE = 25.0  # [Hz] at which animations are compared: about what the eye resolves
 _NAN = float("nan")
 
 
@@ -84,7 +84,7 @@ MEASURES: dict[str, Measure] = {
     )
 }  # fmt: skip
 """All measures by name; `margin_used` belongs to a condition, not a trial, and is added in the analysis."""
-OF_CONDITIONS = ("margin_used",)
+CONDITION_MEASURES = ("margin_used",)
 _KINDS = ("none", "kinematic", "physical")
 
 
@@ -93,11 +93,11 @@ def measures_of(figure: str) -> tuple[str, ...]:
     return tuple(name for name, measure in MEASURES.items() if _KINDS.index(measure.figure) <= _KINDS.index(figure))
 
 
-def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
+def measure_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
     """All measures of a completed trial, by name; NaN where there is nothing to measure."""
     ticks, frames = log.ticks, log.frames
     start = min(SETTLING, 0.5 * float(ticks["t"][-1]))
-    intent = meant_to_leave(config, ticks["t"])
+    intent = intends_to_leave(config, ticks["t"])
     ticks, intent = {name: channel[ticks["t"] >= start] for name, channel in ticks.items()}, intent[ticks["t"] >= start]
     measures = dict.fromkeys(measures_of(config.figure.kind), _NAN)
     measures |= _hand_measures(ticks, intent, session) | {
@@ -105,19 +105,19 @@ def measured_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[s
     }
     del measures["margin_used"]
     if frames:
-        stride = max(1, round(1.0 / (SEEN_RATE * session.servo.plant.period * session.servo.figure_ticks)))
+        stride = max(1, round(1.0 / (COMPARISON_RATE * session.servo.plant.period * session.servo.figure_ticks)))
         measures |= _animation_measures(session, log, stride, start, config)
     if "joint_error" in frames:
         measures |= _figure_measures(frames, session.weight)
     return measures
 
 
-def meant_to_leave(config: RunConfig, t: Array) -> Mask:
-    """Whether the hand intends to leave the curve at times t [s]: always in a task of `PERSONAL`, else only in pushes.
+def intends_to_leave(config: RunConfig, t: Array) -> Mask:
+    """Whether the hand intends to leave the curve at times t [s]: always with one of `PERSON_INTENTS`, else in pushes.
 
     A push counts from its start until `SETTLING` after its end.
     """
-    if config.user.does in PERSONAL:
+    if config.user.does in PERSON_INTENTS:
         return np.ones(len(t), dtype=bool)
     spans = [(push.at, push.at + push.seconds + SETTLING) for push in config.user.pushes]
     return np.any([(at <= t) & (t <= end) for at, end in spans], axis=0) if spans else np.zeros(len(t), dtype=bool)
@@ -162,7 +162,7 @@ def _animation_measures(
     rows = slice(None, None, stride * session.servo.figure_ticks)
     default = default_poses(session, stride)(*(ticks[name][rows] for name in ("nearest", "phase", "river")))
     t, edited = frames["t"][::stride], frames["reference"][::stride]
-    chosen = (t >= start) & meant_to_leave(config, t)
+    chosen = (t >= start) & intends_to_leave(config, t)
     if not np.any(chosen):
         return {}
     return {
@@ -176,7 +176,7 @@ def _figure_measures(frames: Mapping[str, Array], weight: float) -> dict[str, fl
     fallen = frames["down"] != UP
     end = int(np.argmax(fallen)) if np.any(fallen) else len(fallen)
     flight = frames["flight"][:end] > 0.0
-    standing = frames["ground"][:end, 2][~flight] > SUPPORTS
+    standing = frames["ground"][:end, 2][~flight] > MIN_GROUND_FORCE
     return {
         "fell": float(np.any(fallen)),
         "ballistic_error": _rms(np.linalg.norm(frames["residual"][:end, :3][flight], axis=1)) / weight,

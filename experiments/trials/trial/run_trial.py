@@ -20,7 +20,7 @@ from experiments.results.folder import RECORDING
 from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from experiments.trials.trial.measures import measured_trial
+from experiments.trials.trial.measures import measure_trial
 from experiments.trials.trial.trial_log import TrialLog
 from models.mocap.motion.clip import Clip
 from sim.loop.channels import groups, record_into
@@ -76,7 +76,7 @@ class Row(NamedTuple):
     processor: str
 
 
-class Shelf:
+class MapCache:
     """Cache of haptic maps that several runs share; a cached map is only read.
 
     Clips, alignment and blends of a map take ten times as long as the rest of a trial's set-up.
@@ -112,11 +112,11 @@ def _map_key(config: RunConfig) -> object:
     return replace(config, seed=1, user=type(config.user)(does=config.user.does)), figure
 
 
-SHELF = Shelf()
+MAP_CACHE = MapCache()
 """The cache of this process."""
 
 
-def perform(task: Task, shelf: Shelf = SHELF) -> Row:
+def perform_trial(task: Task, shelf: MapCache = MAP_CACHE) -> Row:
     """Run a trial and measure it; an error in the trial gives a row with its reason.
 
     Errors of the machine rather than the trial are raised, so that the trial can be tried again.
@@ -138,13 +138,13 @@ def perform(task: Task, shelf: Shelf = SHELF) -> Row:
     return Row(task.key, "done", "", measures, time.thread_time() - start, worker, get_host_cpu_name())
 
 
-def _run_trial(config: RunConfig, task: Task, shelf: Shelf) -> dict[str, float]:
+def _run_trial(config: RunConfig, task: Task, shelf: MapCache) -> dict[str, float]:
     session = shelf.session(config)
     log = TrialLog(session.servo, session.world)
     if not task.recordings:
         return _simulate(config, session, log)
     with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
-        measures = recorded(config, session, log, Path(folder))
+        measures = run_recorded(config, session, log, Path(folder))
         _copy_to_url(Path(folder) / RECORDING, f"{task.recordings.rstrip('/')}/{task.key}.h5")
     return measures
 
@@ -152,10 +152,10 @@ def _run_trial(config: RunConfig, task: Task, shelf: Shelf) -> dict[str, float]:
 def _simulate(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
     laws = session.parts.program.python_laws
     Loop(session.servo, session.world, log, python_laws=laws).run(config.seconds)
-    return measured_trial(config, session, log)
+    return measure_trial(config, session, log)
 
 
-def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -> dict[str, float]:
+def run_recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -> dict[str, float]:
     """Run a trial, record it into an existing folder, and measure it."""
     servo, laws = session.servo, session.parts.program.python_laws
     static = session.static()
@@ -167,7 +167,7 @@ def recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -
             record(ticks, frames, n)
 
         Loop(servo, session.world, observe, python_laws=laws).run(config.seconds)
-        measures = measured_trial(config, session, log)
+        measures = measure_trial(config, session, log)
         recorder.close({"lines": [], "measures": measures})
     return measures
 

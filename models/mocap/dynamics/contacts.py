@@ -16,7 +16,7 @@ import numpy as np
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
-from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import cleaned, spans
 
 # Height below which a part touches at any speed [m]. Half or twice the value changes whether the body is supported in
@@ -38,7 +38,7 @@ _ROOT_SPEED_FRACTION = 0.3
 # Half or twice any of the next four values changes whether a sphere stands in at most 0.9 % of the frames of 19
 # captures (in one capture 9 %, if stances of up to 0.12 s are dropped).
 _MAX_TOE_HEIGHT, _MAX_TOE_SPEED = 0.10, 0.15  # [m], [m/s]: of toes that stand beside a standing heel
-GAP, SHORT = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
+MAX_FILLED_GAP, MIN_STANCE_TIME = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
 # Largest height of a settled foot above the median of its stance [m]. Half or twice the value changes the foot skate in
 # leading by 0.7 cm.
 _MAX_SETTLED_RISE = 0.005
@@ -128,7 +128,7 @@ def contacts(clip: Clip) -> Contacts:
     slow = (heights < max_heights) & (speeds < max_speeds)
     sliding = (heights < _MAX_SLIDING_HEIGHT) & (vertical_speeds < _MAX_VERTICAL_SPEED)
     resting = slow.copy()
-    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSES))
+    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSURE_TOLERANCE))
     resting[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
     return Contacts(heights, (heights < _CONTACT_HEIGHT) | slow | sliding, resting)
 
@@ -138,7 +138,8 @@ def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) 
 
     A part stands while its middle is lower than `_MAX_STANCE_HEIGHT`, and slower than `_MAX_STANCE_SPEED` or than
     `_ROOT_SPEED_FRACTION` of the root's speed. Toes stand beside a standing heel up to `_MAX_TOE_HEIGHT`, if they are
-    slower than `_MAX_TOE_SPEED`. Gaps shorter than `GAP` are filled, stances shorter than `SHORT` dropped.
+    slower than `_MAX_TOE_SPEED`. Gaps shorter than `MAX_FILLED_GAP` are filled, and stances shorter than
+    `MIN_STANCE_TIME` dropped.
 
     Parameters
     ----------
@@ -162,7 +163,9 @@ def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) 
     stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _MAX_TOE_HEIGHT) & (speeds[:, :, 1] < _MAX_TOE_SPEED)
     for foot in range(2):
         for part in range(2):
-            stands[:, foot, part] = cleaned(stands[:, foot, part], round(GAP * fps), round(SHORT * fps), closed)
+            stands[:, foot, part] = cleaned(
+                stands[:, foot, part], round(MAX_FILLED_GAP * fps), round(MIN_STANCE_TIME * fps), closed
+            )
     return stands
 
 

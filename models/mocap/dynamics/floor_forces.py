@@ -21,7 +21,7 @@ from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, HAND
 _REGULARISATION = 0.01  # ε: makes the forces unique, shared between spheres, and continuous in the state
 _PYRAMID_SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone
 EDGES = np.array([(x * _PYRAMID_SLOPE, y * _PYRAMID_SLOPE, 1.0) for x in (-1, 1) for y in (-1, 1)])
-WITH_HANDS = FOOT_CONTACTS + HAND_CONTACTS
+ALL_CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
 
 
 class Carrier(NamedTuple):
@@ -32,7 +32,7 @@ class Carrier(NamedTuple):
     body : int
         Index into `BODIES`.
     spheres : slice
-        The spheres at the end of its limb, of `WITH_HANDS`.
+        The spheres at the end of its limb, of `ALL_CONTACTS`.
     """
 
     body: int
@@ -55,11 +55,11 @@ _CARRIERS = _all_carriers()
 
 
 def carriers(spheres: int) -> tuple[Carrier, ...]:
-    """The 6 or 16 segments whose joints are loaded by the first 8 or by all 10 contact spheres of `WITH_HANDS`."""
+    """The 6 or 16 segments whose joints are loaded by the first 8 or by all 10 contact spheres of `ALL_CONTACTS`."""
     return tuple(carrier for carrier in _CARRIERS if carrier.spheres.stop <= spheres)
 
 
-class Demand(NamedTuple):
+class RequiredWrench(NamedTuple):
     """Inverse dynamics of m states, and the geometry of their contacts.
 
     Attributes
@@ -120,7 +120,7 @@ class Floor:
     moment_per_force : float
         S: weight of a residual moment relative to a residual force [1/m].
     spheres : tuple of str
-        Contact spheres that may bear load: `FOOT_CONTACTS` or `WITH_HANDS`.
+        Contact spheres that may bear load: `FOOT_CONTACTS` or `ALL_CONTACTS`.
     """
 
     def __init__(self, moment_per_force: float = 2.0, spheres: tuple[str, ...] = FOOT_CONTACTS) -> None:
@@ -131,7 +131,7 @@ class Floor:
         self._bodies = [self._model.body(BODIES[carrier.body]).id for carrier in carriers(len(spheres))]
         self._scale = np.repeat([1.0, moment_per_force], 3)
 
-    def demand(self, q: Array, v: Array, a: Array) -> Demand:
+    def demand(self, q: Array, v: Array, a: Array) -> RequiredWrench:
         """Inverse dynamics of states, shapes (m, 75), (m, 57), (m, 57)."""
         m, k, c, d = len(q), len(self._geoms), len(self._bodies), self._data
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, k, 3)), np.empty((m, 3))
@@ -150,9 +150,9 @@ class Floor:
         about_root = np.einsum("mij,mj->mi", root.reshape(m, 3, 3), force[:, 3:6])
         moment = about_root - np.cross(com - q[:, :3], force[:, :3])
         wrench = np.concatenate([force[:, :3], moment], axis=1)
-        return Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
+        return RequiredWrench(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
 
-    def grip(self, demand: Demand, standing: Mask) -> Array:
+    def grip(self, demand: RequiredWrench, standing: Mask) -> Array:
         """f*: forces along the pyramids' edges, shape (m, 4k) [N]; only spheres in `standing` (m, k) bear load."""
         columns = self._scale[:, None] * demand.columns()
         grip = np.zeros((len(columns), columns.shape[2]))
@@ -163,18 +163,18 @@ class Floor:
                 grip[k, edges] = nnls(system, np.concatenate([self._scale * demand.wrench[k], np.zeros(len(edges))]))[0]
         return grip
 
-    def lacking(self, demand: Demand, standing: Mask) -> Array:
+    def lacking(self, demand: RequiredWrench, standing: Mask) -> Array:
         """‖S (w − A f*)‖: residual under contact at the spheres in `standing` (m, k), shape (m,) [body weights]."""
         weighted_residual = self._scale * residual(demand, self.grip(demand, standing))
         return np.linalg.norm(weighted_residual, axis=1) / self.body_weight
 
-    def answer(self, demand: Demand, grip: Array) -> Array:
+    def answer(self, demand: RequiredWrench, grip: Array) -> Array:
         """K: derivative of f* by the wrench for a fixed set of loaded edges, df* = K dw, shape (m, 4k, 6)."""
         columns = (self._scale[:, None] * demand.columns()) * (grip > 0)[:, None]
         gram = columns @ columns.transpose(0, 2, 1) + _REGULARISATION**2 * np.eye(6)
         return columns.transpose(0, 2, 1) @ np.linalg.solve(gram, np.broadcast_to(np.diag(self._scale), gram.shape))
 
 
-def residual(demand: Demand, grip: Array) -> Array:
+def residual(demand: RequiredWrench, grip: Array) -> Array:
     """Residual wrench r = w − A f under contact forces f, shape (m, 6) [N, N m]."""
     return demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)

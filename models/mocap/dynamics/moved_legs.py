@@ -13,7 +13,7 @@ _CHAINS = tuple(
 )
 
 
-def leg_lines(poses: Array) -> tuple[Array, float]:
+def hip_to_ankle(poses: Array) -> tuple[Array, float]:
     """Vectors from hips to ankles in the world [m], shape (n, 2, 3), and the length of a straight leg [m]."""
     thigh, shank = _leg_bones()
     segments = global_rotations(poses)
@@ -24,7 +24,7 @@ def leg_lines(poses: Array) -> tuple[Array, float]:
     return np.stack(lines, axis=1), float(np.linalg.norm(thigh) + np.linalg.norm(shank))
 
 
-def with_moved_body(poses: Array, shift: Array, planted: Array) -> Array:
+def displaced_with_planted_feet(poses: Array, shift: Array, planted: Array) -> Array:
     """Poses displaced as a whole except for standing feet.
 
     Parameters

@@ -18,12 +18,12 @@ from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.coordinates import states
-from models.mocap.dynamics.floor_forces import Demand, Floor, residual
+from models.mocap.dynamics.floor_forces import Floor, RequiredWrench, residual
 
 DEGREE = 5
 _STRAIN_THRESHOLD = 0.8  # fraction of the torque limits beyond which strain counts: a fifth is left for the feedback
-LAG = 0.012  # a sphere stands for this time before and after it bears load [s]: no force without contact
-MARGIN = 0.02  # distance kept from the joints' limits [rad]
+LOAD_DELAY = 0.012  # a sphere stands for this time before and after it bears load [s]: no force without contact
+JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
 
 
 class Stance(NamedTuple):
@@ -142,7 +142,7 @@ class Errors(NamedTuple):
     weighted: Array
     grip: Array
     residual: Array
-    demand: Demand
+    demand: RequiredWrench
 
 
 class _LinearForces(NamedTuple):
@@ -201,7 +201,7 @@ class Motion:
         for stance in task.stances:
             in_stance = (task.times >= stance.start - 1e-9) & (task.times <= stance.end + 1e-9)
             self._standing[in_stance, stance.sphere] = True
-            loaded = (task.times > stance.start + LAG) & (task.times < stance.end - LAG)
+            loaded = (task.times > stance.start + LOAD_DELAY) & (task.times < stance.end - LOAD_DELAY)
             self._loaded[loaded, stance.sphere] = True
             self._places[in_stance, stance.sphere, :2] = stance.place
         misfit = (task.sketch - self._offsets[0]).ravel()
@@ -239,7 +239,8 @@ class Motion:
             slip.reshape(len(u), 24),
             w.depth * np.where(standing, 0.0, np.minimum(low, 0.0)),
             w.effort * effort + w.strain * (effort - np.clip(effort, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)),
-            w.limit * (vectors - np.clip(vectors, limits[:, 0] + MARGIN, limits[:, 1] - MARGIN)),
+            w.limit
+            * (vectors - np.clip(vectors, limits[:, 0] + JOINT_LIMIT_MARGIN, limits[:, 1] - JOINT_LIMIT_MARGIN)),
         ]
         return Errors(np.concatenate(parts, axis=1), grip, missing, demand)
 

@@ -12,7 +12,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
 from models.mocap.motion import quaternions
 
-CLOSES = 1e-3
+CLOSURE_TOLERANCE = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
 
 _UPSIDE_DOWN_COSINE = -0.5  # vertical component of the pelvis axis: a high kick leans by up to 97°, a cartwheel by 149°

@@ -17,7 +17,7 @@ from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssu
 from models.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.poses import around, plus
+from models.mocap.preparation.poses import add_tangents, extend_periodically
 
 DEGREE = 5
 # Step of the finite differences for velocities and accelerations [s]. Half or twice the step changes accelerations of
@@ -86,7 +86,7 @@ class Change:
         if self.closed:
             c, s = np.cos(displacement.yaw), np.sin(displacement.yaw)
             self.wrap[:2, :2] = [[c, -s], [s, c]]
-            poses, first = around(clip, _PERIODIC_MARGIN)
+            poses, first = extend_periodically(clip, _PERIODIC_MARGIN)
             self._reference = CubicSpline((np.arange(len(poses)) - first) / clip.fps, poses)
         else:
             ends = "clamped" if self._ends_at_rest else "not-a-knot"
@@ -124,7 +124,7 @@ class Change:
         indices = self.first[instants, None] + np.arange(DEGREE + 1)
         d, dd, ddd = (np.einsum("mk,mkn->mn", self.basis[order][instants], points[indices]) for order in range(3))
         moments = [
-            plus(
+            add_tangents(
                 self._reference_at(times + o * _DIFFERENCE_STEP),
                 d + o * _DIFFERENCE_STEP * dd + 0.5 * _DIFFERENCE_STEP**2 * o * o * ddd,
             )
@@ -144,7 +144,7 @@ class Change:
         n = round(self.clip.duration * fps)
         times = np.arange(n + 1) * self._end / n
         tangents = self._spline(np.minimum(times, self._end - 1e-12)) @ self.points(x)
-        poses = plus(self._reference_at(times), tangents)
+        poses = add_tangents(self._reference_at(times), tangents)
         if self.closed:
             poses[-1] = self.clip.displacement.moved(poses[0])
         return Clip(poses, n / self._end, self.clip.name)
@@ -155,7 +155,7 @@ class Change:
         return np.einsum("mk,mkn->mn", self.basis[0], self.points(x)[indices])
 
 
-class Normal:
+class NormalEquations:
     """Normal equations H x = g for the control points of a change: a band, and a border where the motion is closed.
 
     Parameters
@@ -173,9 +173,9 @@ class Normal:
         self.side = np.zeros((self._inner, change.border))
         self.corner = np.zeros((change.border, change.border))
 
-    def copy(self) -> "Normal":
+    def copy(self) -> "NormalEquations":
         """A copy to which more blocks can be added."""
-        result = Normal(self._change)
+        result = NormalEquations(self._change)
         result.band, result.side, result.corner = self.band.copy(order="K"), self.side.copy(), self.corner.copy()
         return result
 

@@ -21,12 +21,12 @@ import numpy.typing as npt
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
-from models.mocap.dynamics.floor_forces import EDGES, WITH_HANDS, Floor
-from models.mocap.dynamics.spacetime import MARGIN
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
+from models.mocap.dynamics.spacetime import JOINT_LIMIT_MARGIN
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import vectors_in_ranges
-from models.mocap.preparation.change import DEGREE, Change, Normal
+from models.mocap.preparation.change import DEGREE, Change, NormalEquations
 from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
 
@@ -35,7 +35,7 @@ _STRAIN_THRESHOLD = 0.75  # fraction of the legs' torque limits beyond which tor
 # in a run.
 _KNOT_SPACING, _INSTANT_SPACING = 0.05, 0.0125
 # Iteration ends when the last 3 steps together lower the cost by less than 1 %.
-_TOLERANCE, _CONVERGENCE_STEPS = 0.01, 3
+_COST_TOLERANCE, _CONVERGENCE_STEPS = 0.01, 3
 # Excess [rad] over a joint's range from which its cost is linear, an exact penalty (Nocedal & Wright 2006, ch. 17).
 # If it is squared throughout, a captured ankle 100° beyond its range outweighs all other errors, and spinkick has a
 # residual of 3.5 % of body weight instead of 2.3 %. With 0.1 the figure falls in snu/backflip; with 0.03 a wrist in a
@@ -192,7 +192,7 @@ class _Problem:
 
     def __init__(self, change: Change, schedule: Stances) -> None:
         self.change, self.w = change, FeasibleWeights()
-        self.contacts = WITH_HANDS[: schedule.standing.shape[1]]
+        self.contacts = ALL_CONTACTS[: schedule.standing.shape[1]]
         self.floor = Floor(self.w.moment / self.w.force, self.contacts)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
         self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
@@ -200,8 +200,8 @@ class _Problem:
         self.pinned = np.repeat(schedule.kept[frames][:, :, None], 3, axis=2)
         self.pinned[:, :, 2] = self.grounded
         self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
-        self.low, self.high = joint_range()[..., 0] + MARGIN, joint_range()[..., 1] - MARGIN
-        self.fixed = Normal(change)
+        self.low, self.high = joint_range()[..., 0] + JOINT_LIMIT_MARGIN, joint_range()[..., 1] - JOINT_LIMIT_MARGIN
+        self.fixed = NormalEquations(change)
         tracking = self.w.tracking() ** 2
         smoothness = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
         for interval in range(change.intervals):
@@ -215,7 +215,7 @@ class _Problem:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
-        """Levenberg–Marquardt from δ = 0, until `_CONVERGENCE_STEPS` steps lower the cost by less than `_TOLERANCE`."""
+        """Levenberg–Marquardt from δ = 0, until `_CONVERGENCE_STEPS` lower the cost by `_COST_TOLERANCE` at most."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
         costs = [self.cost(self.errors(x, False), x)]
@@ -233,12 +233,12 @@ class _Problem:
             damping = max(damping / 8.0, 1e-8) if predicted else max(8.0 * damping, 1e-4)
             x = x - step
             costs.append(cost)
-            if len(costs) > _CONVERGENCE_STEPS and costs[-1 - _CONVERGENCE_STEPS] - cost < _TOLERANCE * cost:
+            if len(costs) > _CONVERGENCE_STEPS and costs[-1 - _CONVERGENCE_STEPS] - cost < _COST_TOLERANCE * cost:
                 break
         return x, costs
 
-    def _linearise(self, x: Array) -> tuple[Normal, Array]:
-        """Normal equations and half the gradient of the cost."""
+    def _linearise(self, x: Array) -> tuple[NormalEquations, Array]:
+        """NormalEquations equations and half the gradient of the cost."""
         change = self.change
         system, parts = self.fixed.copy(), np.zeros((change.intervals, (DEGREE + 1) * N_TANGENT))
         for start in range(0, change.intervals, _CHUNK):
@@ -333,7 +333,7 @@ class _Problem:
             jacobian[strained, :, :_TORQUE_END] = gain[:, None, :, None] * torque
 
 
-class Borne(NamedTuple):
+class ContactForces(NamedTuple):
     """Contact forces of a clip, the force that they leave, and the largest joint torque.
 
     Attributes
@@ -354,7 +354,7 @@ class Borne(NamedTuple):
     joint: str
 
 
-def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
+def contact_forces(clip: Clip, schedule: Stances, passage: bool = False) -> ContactForces:
     """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
     change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
     problem = _Problem(change, schedule)
@@ -365,4 +365,4 @@ def borne(clip: Clip, schedule: Stances, passage: bool = False) -> Borne:
     loads = np.column_stack([np.interp(frames, change.times, force) for force in forces.T])
     torque_ratios = np.abs(errors.torque_ratio).max(axis=0)
     residual = _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
-    return Borne(residual, loads, float(torque_ratios.max()), JOINTS[int(torque_ratios.argmax()) // 3])
+    return ContactForces(residual, loads, float(torque_ratios.max()), JOINTS[int(torque_ratios.argmax()) // 3])

@@ -8,13 +8,13 @@ from models.arrays import Array
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.motion.quaternions import rotated
-from models.mocap.preparation.bounds import beyond
-from models.mocap.preparation.looping import Looped
+from models.mocap.preparation.bounds import exceeding_text
+from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.poses import resampled
 
 # Largest RMS distances of the joints, for a gait and for another motion [rad], and of the root [m]. In a prototype of
 # the preparation, joints changed by 1.7 to 3° in gaits and by 7 to 8° in fighting and a punch, roots by 2.3 to 6.6 cm.
-GAIT, OTHERWISE, ROOT = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
+MAX_GAIT_JOINT_DISTANCE, MAX_JOINT_DISTANCE, MAX_ROOT_ERROR = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
 # Distance from the root of the points to its left that determine its heading [m], an arm's length. Half or twice the
 # value changes the distances of the roots by at most 0.8 cm in the 28 captures of docs/validation/prepared-captures.md.
 _HEADING_LEVER = 0.7
@@ -23,7 +23,7 @@ _LISTED_COUNT = 5  # number of joints in `Fidelity.extremes`
 _MIN_GAIT_TRAVEL = 0.4  # displacement of a lap beyond which a closed clip that does not turn over is a gait [m]
 
 
-class Extreme(NamedTuple):
+class WorstJoint(NamedTuple):
     """Where a joint differs most.
 
     Attributes
@@ -58,18 +58,18 @@ class Fidelity(NamedTuple):
 
     joints: float
     root: float
-    extremes: tuple[Extreme, ...]
+    extremes: tuple[WorstJoint, ...]
     gait: bool
 
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
         found: list[str] = []
-        if self.joints > (bound := GAIT if self.gait else OTHERWISE):
-            far, most = beyond(np.rad2deg(self.joints), np.rad2deg(bound)), f"{np.rad2deg(bound):.0f}"
+        if self.joints > (bound := MAX_GAIT_JOINT_DISTANCE if self.gait else MAX_JOINT_DISTANCE):
+            far, most = exceeding_text(np.rad2deg(self.joints), np.rad2deg(bound)), f"{np.rad2deg(bound):.0f}"
             found.append(f"joints are {far}° RMS from the capture; {most} at most")
-        if self.root > ROOT:
-            far = beyond(100 * self.root, 100 * ROOT)
-            found.append(f"the root is {far} cm RMS from the capture; {100 * ROOT:.0f} at most")
+        if self.root > MAX_ROOT_ERROR:
+            far = exceeding_text(100 * self.root, 100 * MAX_ROOT_ERROR)
+            found.append(f"the root is {far} cm RMS from the capture; {100 * MAX_ROOT_ERROR:.0f} at most")
         return tuple(found)
 
     def line(self) -> str:
@@ -81,7 +81,7 @@ class Fidelity(NamedTuple):
         )
 
 
-def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
+def fidelity(clip: Clip, captured: Clip, part: LoopedClip, pace: float) -> Fidelity:
     """Compare a prepared clip with the calibrated capture.
 
     Frames that the capture does not have (the mirror image of half a stride, the way back of a gesture, the transitions
@@ -108,7 +108,7 @@ def fidelity(clip: Clip, captured: Clip, part: Looped, pace: float) -> Fidelity:
     largest = np.argsort(-angles.max(axis=0))[:_LISTED_COUNT]
     return Fidelity(
         float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(over_floor**2 + height**2))),
-        tuple(Extreme(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in largest),
+        tuple(WorstJoint(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in largest),
         clip.closes() and not clip.turns_over
         and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _MIN_GAIT_TRAVEL),
     )  # fmt: skip
@@ -130,7 +130,7 @@ def _root_distances(clip_poses: Array, capture_poses: Array) -> Array:
     return np.abs(b * turn - a)
 
 
-def common_frames(clip: Clip, captured: Clip, part: Looped, pace: float) -> tuple[slice, slice]:
+def common_frames(clip: Clip, captured: Clip, part: LoopedClip, pace: float) -> tuple[slice, slice]:
     """Frames of a prepared clip, and of the paced capture at the clip's rate, that show the same moments.
 
     Moments that the capture does not have are in neither. The parameters are those of `fidelity`.

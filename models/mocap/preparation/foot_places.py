@@ -24,7 +24,7 @@ from models.mocap.motion.spans import cleaned, spans
 _MIN_TURN_RATE, _MIN_TURN_ANGLE = 1.5, np.deg2rad(45.0)
 # Vertical load above which something must bear it [body weights]. Half or twice the value changes whether a sphere
 # stands in at most 0.9 % of the frames of 19 captures.
-LOADED = 0.35
+MIN_LOAD = 0.35
 # Shortest time for which a foot lies flat between two turns in the same direction, or at an end of the stance [s]:
 # places are kept for 0.05 s on either side. If shorter ones are allowed, dance_a has a residual of 4.8 % of body weight
 # instead of 3.3 %.
@@ -50,7 +50,7 @@ def place_foot(
     parts : Mask
         Whether heel and toes stand, shape (n, 2).
     turning : sequence of (int, int)
-        Frames in which it turns, from `turns`.
+        Frames in which it turns, from `foot_turns`.
     standing : Mask
         Which spheres stand, shape (n, 4): written where the foot turns.
     places : Array
@@ -73,7 +73,7 @@ def place_foot(
         places[:, :, :2] += np.median((points - places)[standing][:, :2], axis=0)
 
 
-def turns(rate: Array, load: Array, fps: float) -> list[tuple[int, int]]:
+def foot_turns(rate: Array, load: Array, fps: float) -> list[tuple[int, int]]:
     """Spans (first frame, frame after the last) in which a standing foot turns by 45° or more under load.
 
     Parameters
@@ -93,13 +93,13 @@ def turns(rate: Array, load: Array, fps: float) -> list[tuple[int, int]]:
         found += (
             (start, end)
             for start, end in spans(~at_rest)
-            if direction * rate[start:end].sum() / fps > _MIN_TURN_ANGLE and load[start:end].mean() > LOADED
+            if direction * rate[start:end].sum() / fps > _MIN_TURN_ANGLE and load[start:end].mean() > MIN_LOAD
         )
     found.sort()
     return [turn for k, turn in enumerate(found) if k == 0 or turn[0] >= found[k - 1][1]]
 
 
-def lying(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
+def flat_sole(points: Array, sole: Array, yaw: float, spheres: list[int]) -> Array:
     """Sphere centres of a sole flat on the floor, placed at the median of its spheres over frames, shape (4, 3) [m]."""
     c, s = np.cos(yaw), np.sin(yaw)
     level = sole[:, :2] @ np.array([[c, s], [-s, c]])
@@ -116,4 +116,4 @@ def _flat_place(points: Array, yaw: Array, sole: Array, parts: Mask) -> Array:
         frames, spheres = toe, [2, 3]
     else:
         frames, spheres = heel, [0, 1]
-    return lying(points[frames], sole, float(np.median(yaw[frames])), spheres)
+    return flat_sole(points[frames], sole, float(np.median(yaw[frames])), spheres)

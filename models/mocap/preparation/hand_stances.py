@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
-from models.mocap.dynamics.contacts import GAP, HAND_REACH, SHORT, contacts
-from models.mocap.dynamics.floor_forces import WITH_HANDS, Floor
+from models.mocap.dynamics.contacts import HAND_REACH, MAX_FILLED_GAP, MIN_STANCE_TIME, contacts
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, Floor
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.motion.spans import cleaned, spans
 
@@ -28,7 +28,7 @@ from models.mocap.motion.spans import cleaned, spans
 _MIN_RESIDUAL_DECREASE = 0.2
 
 
-def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: float) -> Mask:
+def loaded_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: float) -> Mask:
     """Whether each palm bears load, left and right, shape (n, 2).
 
     Parameters
@@ -46,8 +46,10 @@ def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: flo
     no_hands = np.zeros((n, len(HAND_CONTACTS)), dtype=bool)
     if n < 3 or points[:, len(FOOT_CONTACTS) :, 2].min() - CONTACT_RADIUS > HAND_REACH:
         return no_hands
-    resting = contacts(Clip(poses, fps, "hands")).resting[:, len(FOOT_CONTACTS) : len(WITH_HANDS)]
-    stances = np.stack([cleaned(hand, round(GAP * fps), round(SHORT * fps)) for hand in resting.T], axis=1)
+    resting = contacts(Clip(poses, fps, "hands")).resting[:, len(FOOT_CONTACTS) : len(ALL_CONTACTS)]
+    stances = np.stack(
+        [cleaned(hand, round(MAX_FILLED_GAP * fps), round(MIN_STANCE_TIME * fps)) for hand in resting.T], axis=1
+    )
     frames = np.flatnonzero(stances.any(axis=1))
     if not len(frames):
         return no_hands
@@ -60,7 +62,7 @@ def bearing_hands(points: Array, poses: Array, calm: Array, feet: Mask, fps: flo
     return bearing
 
 
-def bear_longer(palms: Array, hands: Mask, start: int, end: int, far: float) -> None:
+def extend_hand_stances(palms: Array, hands: Mask, start: int, end: int, far: float) -> None:
     """Extend the stances of hands over frames start to end, in which nothing else stands although the body is loaded.
 
     A stance before or after is extended for as long as its palm (n, 2, 3) is within reach of the floor, and within
@@ -79,7 +81,7 @@ def bear_longer(palms: Array, hands: Mask, start: int, end: int, far: float) -> 
 
 def _residual_decrease(calm: Array, frames: npt.NDArray[np.intp], feet: Mask, hands: Mask, fps: float) -> Array:
     """Decrease of the residual ‖S (w − A f*)‖ by the hands in the given frames [body weights]."""
-    floor = Floor(spheres=WITH_HANDS)
+    floor = Floor(spheres=ALL_CONTACTS)
     steps = pose_difference(calm[:-1], calm[1:]) * fps
     inner = np.clip(frames, 1, len(calm) - 2)
     v, a = 0.5 * (steps[inner - 1] + steps[inner]), (steps[inner] - steps[inner - 1]) * fps

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, figure_model
-from models.mocap.dynamics.floor_forces import Demand, carriers
+from models.mocap.dynamics.floor_forces import RequiredWrench, carriers
 from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
 
@@ -73,7 +73,7 @@ class InverseDynamics:
         arm = com - state.q[:, :3]
         moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
         wrench = np.concatenate((force[:, :3], moment), axis=1)
-        self.demand = Demand(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
+        self.demand = RequiredWrench(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
         if with_jacobian:
             self._assemble_derivatives(state, partials, force, root, arm)
 

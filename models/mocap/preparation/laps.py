@@ -18,7 +18,7 @@ import numpy as np
 from models.arrays import Array, IntArray
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import CLOSES, Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 
 # Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ matters: half the value loops two of them differently
 # and moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
@@ -26,7 +26,7 @@ _TIME_SCALE, _LENGTH_SCALE = 0.1, 0.5
 _MIN_LAP_DURATION = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44; half changes none of 17 captures
 # Least travel of a lap [m] and largest change of heading in it [rad]; `controllers.haptic_map.led` requires the same.
 # Half or twice the first, and twice the second, change no lap of 17 captures; with 15° a hop on the spot has none.
-LEAST_TRAVEL, LARGEST_TURN = 0.5, np.deg2rad(30.0)
+MIN_LAP_TRAVEL, MAX_LAP_TURN = 0.5, np.deg2rad(30.0)
 _MAX_COMPARED_FRAMES = 1200  # largest number of frames that are compared with each other: their matrix takes 12 MB
 
 
@@ -49,18 +49,18 @@ class Lap(NamedTuple):
     gap: float
 
 
-def lap_of(clip: Clip) -> Lap:
+def best_lap(clip: Clip) -> Lap:
     """The part of a clip that repeats itself best; the clip itself if it closes, or if no part of it is a lap."""
     whole = Lap(clip, 0.0, clip.duration, 0.0)
-    if clip.closes(CLOSES) or clip.n_frames < 3:
+    if clip.closes(CLOSURE_TOLERANCE) or clip.n_frames < 3:
         return whole
     frame_step = -(-clip.n_frames // _MAX_COMPARED_FRAMES)
     frames = np.arange(0, clip.n_frames, frame_step)
-    distances, headings = likeness(clip, frames)
+    distances, headings = frame_distances(clip, frames)
     travel = np.linalg.norm(clip.poses[frames, None, :2] - clip.poses[None, frames, :2], axis=2)
     turn = np.abs(headings[:, None] - headings)
     later = frames[None, :] - frames[:, None]
-    lap = (later >= _MIN_LAP_DURATION * clip.fps) & (travel >= LEAST_TRAVEL) & (turn <= LARGEST_TURN)
+    lap = (later >= _MIN_LAP_DURATION * clip.fps) & (travel >= MIN_LAP_TRAVEL) & (turn <= MAX_LAP_TURN)
     planted = contacts(clip).planted
     for foot in range(planted.shape[1]):
         stance_frames = np.concatenate([[0], np.cumsum(planted[:, foot])])[frames]
@@ -74,7 +74,7 @@ def lap_of(clip: Clip) -> Lap:
     return Lap(part, first / clip.fps, last / clip.fps, float(distances[i, j]))
 
 
-def likeness(clip: Clip, frames: IntArray) -> tuple[Array, Array]:
+def frame_distances(clip: Clip, frames: IntArray) -> tuple[Array, Array]:
     """Distances d between frames [rad], shape (n, n), and unwrapped headings [rad], shape (n,)."""
     poses, velocities = clip.poses[frames], clip.velocities()[frames]
     heading = 2.0 * np.arctan2(poses[:, 6], poses[:, 3])

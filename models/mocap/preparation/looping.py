@@ -15,10 +15,10 @@ import numpy as np
 from models.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.motion.clip import CLOSES, Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.laps import lap_of, likeness
-from models.mocap.preparation.poses import plus, smoothed, sole_points
+from models.mocap.preparation.laps import best_lap, frame_distances
+from models.mocap.preparation.poses import add_tangents, smoothed, sole_points
 from models.mocap.preparation.stances import stances
 
 # Largest d between the ends of a gait cycle, and of a cycle in place [rad]; walks have 0.1 to 0.3. Half the first loops
@@ -63,7 +63,7 @@ _COMPARED_FRAMES = 500
 Kind = Literal["cycle", "half stride", "way back", "open"]
 
 
-class Looped(NamedTuple):
+class LoopedClip(NamedTuple):
     """A looped clip.
 
     Attributes
@@ -85,9 +85,9 @@ class Looped(NamedTuple):
     gap: float
 
 
-def looped(
+def close_or_rest(
     clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False, within: bool = False
-) -> Looped:
+) -> LoopedClip:
     """Close a clip, or bring it to rest at both ends.
 
     Parameters
@@ -122,8 +122,8 @@ def looped(
         start, end = _requested_frames(clip, wish)
         return _close(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
     if clip.closes():
-        return Looped(clip, "cycle", 0.0, clip.duration, 0.0)
-    if clip.closes(CLOSES):
+        return LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0)
+    if clip.closes(CLOSURE_TOLERANCE):
         return _close(clip, *whole, 0.0)
     gap = float(_distances(clip, np.array(whole))[0, 1])
     if wraps and gap < _MAX_DECLARED_GAP:
@@ -131,7 +131,7 @@ def looped(
     if (cycle := _find_cycle(clip)) is not None:
         return _close(clip, *cycle)
     if _is_in_place(clip):
-        return _with_way_back(clip, gap)
+        return _with_return(clip, gap)
     if _is_fast(clip) and (half := _find_half_stride(clip)) is not None:
         return _close(clip, *half, half=True)
     return _bring_to_rest(clip, within)
@@ -151,7 +151,7 @@ def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
 
 
 def _distances(clip: Clip, frames: IntArray) -> Array:
-    return likeness(clip, frames)[0]
+    return frame_distances(clip, frames)[0]
 
 
 def _find_cycle(clip: Clip) -> tuple[int, int, float] | None:
@@ -159,7 +159,7 @@ def _find_cycle(clip: Clip) -> tuple[int, int, float] | None:
     frame_step = -(-clip.n_frames // _COMPARED_FRAMES)
     frames = np.arange(0, clip.n_frames, frame_step)
     distances = _distances(clip, frames)
-    lap = lap_of(clip)
+    lap = best_lap(clip)
     speeds = np.sqrt(np.mean(clip.velocities()[frames, 6:] ** 2, axis=1))
     candidates: list[tuple[int, int, float, float]] = []
     if lap.clip.n_frames < clip.n_frames:
@@ -190,7 +190,7 @@ def _is_in_place(clip: Clip) -> bool:
     return bool(np.hypot(*travel) < _IN_PLACE_DISTANCE and abs(clip.displacement.yaw) < _IN_PLACE_ANGLE)
 
 
-def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> Looped:
+def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> LoopedClip:
     """The frames from first to last as a closed lap, cross-faded with the frames before the first and after the last.
 
     With `half`, the part ends like the mirror image of its start, and is continued by its own mirror image.
@@ -208,13 +208,13 @@ def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) ->
             # 0 is the motion at the lap's end, 1 that at its start (or its mirror image), both at the same place.
             fade = _smoothstep((k + before) / (before + after))
             end = inverse.moved(poses[last + k])
-            mixed = plus(end[None], fade * pose_difference(end, opening[first + k])[None])
+            mixed = add_tangents(end[None], fade * pose_difference(end, opening[first + k])[None])
             if k >= 0:
                 lap[k] = image(Clip(mixed, clip.fps, clip.name)).poses[0]
             if k <= 0:
                 lap[n + k] = displacement.moved(mixed[0])
     rest = pose_difference(displacement.moved(image(Clip(lap[:1], clip.fps, clip.name)).poses[0]), lap[-1])
-    lap = plus(lap, -np.linspace(0.0, 1.0, n + 1)[:, None] * rest)
+    lap = add_tangents(lap, -np.linspace(0.0, 1.0, n + 1)[:, None] * rest)
     if half:
         other = image(Clip(lap, clip.fps, clip.name))
         join = Clip(np.vstack((other.poses[0], lap[-1])), clip.fps, clip.name).displacement
@@ -223,7 +223,7 @@ def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) ->
     result = Clip(lap, clip.fps, clip.name)
     if _is_in_place(result) and _has_standing_foot(result):
         result = _without_displacement(result)
-    return Looped(result, "half stride" if half else "cycle", first / clip.fps, last / clip.fps, gap)
+    return LoopedClip(result, "half stride" if half else "cycle", first / clip.fps, last / clip.fps, gap)
 
 
 def _has_standing_foot(clip: Clip) -> bool:
@@ -273,7 +273,7 @@ def _smoothstep(x: float | Array) -> Array:
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
-def _with_way_back(clip: Clip, gap: float) -> Looped:
+def _with_return(clip: Clip, gap: float) -> LoopedClip:
     """The clip and a way back from its last frame to its first: a quintic in the tangent, with matching velocities."""
     first, last = clip.poses[0] if _has_standing_foot(clip) else clip.displacement.moved(clip.poses[0]), clip.poses[-1]
     difference = pose_difference(last, first)
@@ -286,21 +286,21 @@ def _with_way_back(clip: Clip, gap: float) -> Looped:
     ease = _smoothstep(x)
     leave = x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5
     arrive = -4.0 * x**3 + 7.0 * x**4 - 3.0 * x**5
-    way = plus(np.repeat(last[None], n, axis=0), ease * difference + leave * start + arrive * end)
+    way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + leave * start + arrive * end)
     way[-1] = first
-    return Looped(Clip(np.vstack((clip.poses, way)), clip.fps, clip.name), "way back", 0.0, clip.duration, gap)
+    return LoopedClip(Clip(np.vstack((clip.poses, way)), clip.fps, clip.name), "way back", 0.0, clip.duration, gap)
 
 
-def _bring_to_rest(clip: Clip, within: bool) -> Looped:
+def _bring_to_rest(clip: Clip, within: bool) -> LoopedClip:
     """The clip with frames added at both ends, in which velocities decay to zero and the soles come to the floor."""
     if clip.n_frames < 2 or clip.fps * _REST_TIME < 2.0:
-        return Looped(clip, "open", 0.0, clip.duration, 0.0)
+        return LoopedClip(clip, "open", 0.0, clip.duration, 0.0)
     velocities = _low_passed_velocities(clip)
     before = _come_to_rest(clip.poses[0], -velocities[0], clip.fps, within)[::-1]
     after = _come_to_rest(clip.poses[-1], velocities[-1], clip.fps, within)
     poses = np.vstack((before, clip.poses, after))
     start = -len(before) / clip.fps
-    return Looped(Clip(poses, clip.fps, clip.name), "open", start, clip.duration, 0.0)
+    return LoopedClip(Clip(poses, clip.fps, clip.name), "open", start, clip.duration, 0.0)
 
 
 def _low_passed_velocities(clip: Clip) -> Array:
@@ -329,7 +329,7 @@ def _come_to_rest(pose: Array, velocity: Array, fps: float, within: bool) -> Arr
 def _decay(pose: Array, velocity: Array, times: Array, fps: float) -> Array:
     """Poses over the longest of the times T (57,) [s], each component of the velocity decaying over its own time."""
     x = np.minimum(np.arange(1, round(times.max() * fps) + 1)[:, None] / (fps * times), 1.0)
-    return plus(np.repeat(pose[None], len(x), axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
+    return add_tangents(np.repeat(pose[None], len(x), axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
 
 
 def mirrored(clip: Clip) -> Clip:

@@ -21,7 +21,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACT
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.spans import spans
-from models.mocap.preparation.bounds import FLIGHT
+from models.mocap.preparation.bounds import MAX_FLIGHT_ACCELERATION_ERROR
 from models.mocap.preparation.poses import contact_points
 
 # Least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand. Half the value slows
@@ -54,16 +54,16 @@ class Paced(NamedTuple):
     falls: float | None
 
 
-def paced(clip: Clip) -> Paced:
-    """The clip at the pace that makes its flights ballistic; unchanged without any, or if `FLIGHT` allows theirs."""
-    falls = falling(clip)
-    if falls is None or falls < GRAVITY + FLIGHT or falls > GRAVITY / _MIN_PACE**2:
+def correct_pace(clip: Clip) -> Paced:
+    """The clip at the pace that makes its flights ballistic; unchanged within `MAX_FLIGHT_ACCELERATION_ERROR`."""
+    falls = flight_acceleration(clip)
+    if falls is None or falls < GRAVITY + MAX_FLIGHT_ACCELERATION_ERROR or falls > GRAVITY / _MIN_PACE**2:
         return Paced(clip, 1.0, falls)
     pace = float(np.sqrt(GRAVITY / falls))
     return Paced(Clip(clip.poses, clip.fps * pace, clip.name), pace, falls)
 
 
-def falling(clip: Clip) -> float | None:
+def flight_acceleration(clip: Clip) -> float | None:
     """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None.
 
     Flights are found by heights alone, unlike in `contacts`, since all speeds depend on the rate in doubt.

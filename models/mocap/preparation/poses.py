@@ -16,7 +16,7 @@ _CUTOFF_FREQUENCY = 8.0
 _TWO_PASS_RATIO = 0.802
 
 
-def plus(poses: Array, tangents: Array) -> Array:
+def add_tangents(poses: Array, tangents: Array) -> Array:
     """Poses plus tangents, (..., 75) and (..., 57) → (..., 75): mj_integratePos over a unit of time."""
     moved = np.array(poses, dtype=np.float64)
     moved[..., :3] += tangents[..., :3]
@@ -43,7 +43,7 @@ def smoothed(clip: Clip) -> Clip:
     sections = np.asarray(butter(2, _CUTOFF_FREQUENCY / (clip.fps / 2.0) / _TWO_PASS_RATIO, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():
-        poses, first = around(clip, pad)
+        poses, first = extend_periodically(clip, pad)
         smooth = sosfiltfilt(sections, poses, axis=0, padlen=0)[first : first + clip.n_frames]
         smooth[-1] = clip.displacement.moved(smooth[0])
     else:
@@ -51,7 +51,7 @@ def smoothed(clip: Clip) -> Clip:
     return Clip(smooth, clip.fps, clip.name)
 
 
-def around(clip: Clip, margin: int) -> tuple[Array, int]:
+def extend_periodically(clip: Clip, margin: int) -> tuple[Array, int]:
     """A closed clip extended periodically by `margin` frames at both ends, and the index at which the clip begins.
 
     The signs of its quaternions are continuous.
@@ -77,8 +77,8 @@ def with_neighbours(clip: Clip, smooth: Clip) -> tuple[Array, Array, int]:
     """Poses of a clip and of its low-passed version, with a lap before and after if closed, and the clip's start."""
     if not clip.closes():
         return clip.poses, smooth.poses, 0
-    poses, first = around(clip, clip.n_frames)
-    return poses, around(smooth, clip.n_frames)[0], first
+    poses, first = extend_periodically(clip, clip.n_frames)
+    return poses, extend_periodically(smooth, clip.n_frames)[0], first
 
 
 def sole_points(poses: Array) -> Array:

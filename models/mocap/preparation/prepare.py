@@ -14,16 +14,16 @@ from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import FLYING
+from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
-from models.mocap.preparation.looping import Looped, looped
-from models.mocap.preparation.pace import Paced, paced
+from models.mocap.preparation.looping import LoopedClip, close_or_rest
+from models.mocap.preparation.pace import Paced, correct_pace
 from models.mocap.preparation.poses import contact_points, resampled, smoothed
-from models.mocap.preparation.root_path import on_resting_support
-from models.mocap.preparation.stances import Stances, rested, stances
+from models.mocap.preparation.root_path import without_foot_sliding
+from models.mocap.preparation.stances import Stances, stances, with_feet_at_rest
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.retarget_report import COARSE, RetargetReport, two_digits
+from models.mocap.retargeting.retarget_report import MIN_FRAME_RATE, RetargetReport, two_digits
 from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
@@ -87,7 +87,7 @@ class Prepared(NamedTuple):
     captured: Clip
     report: RetargetReport | None
     paced: Paced
-    looped: Looped
+    looped: LoopedClip
     carried: float
     hands: HandLoad
     feasible: Feasible
@@ -124,23 +124,27 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     captured = loaded.clip
     if captured.n_frames < 2:
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_MAX_DURATION:.0f} s")
-    if captured.fps < COARSE and captured.duration > _MAX_DURATION:
+    if captured.fps < MIN_FRAME_RATE and captured.duration > _MAX_DURATION:
         what = f"lasts {captured.duration:.0f} s, since a frame lasts {two_digits(1.0 / captured.fps)} s"
         raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
-    timed = paced(resampled(captured, FPS))
+    timed = correct_pace(resampled(captured, FPS))
     even_clip = resampled(timed.clip, FPS)
     for within in (False, True):
         # Joints stop within their ranges only if needed: otherwise a backflip has a residual of 27 % instead of 8 %.
-        cycle = looped(even_clip, loop, loaded.loops, mirror, within)
+        cycle = close_or_rest(even_clip, loop, loaded.loops, mirror, within)
         if (lasts := cycle.clip.duration) > _MAX_DURATION:
             part = "or a part of it by `hvf prepare --loop START:END`"
             raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_MAX_DURATION:.0f} s, {part}")
         smooth_cycle = smoothed(cycle.clip)
-        planted = on_resting_support(cycle.clip, smooth_cycle)
+        planted = without_foot_sliding(cycle.clip, smooth_cycle)
         smooth = smoothed(planted)
-        schedule = rested(stances(planted, smooth), planted)
+        schedule = with_feet_at_rest(stances(planted, smooth), planted)
         result = feasible(smooth, schedule, fps=FPS)
-        near = result.turned < _MAX_ROTATION_CHANGE and result.raised < _MAX_HEIGHT_CHANGE and result.residual < FLYING
+        near = (
+            result.turned < _MAX_ROTATION_CHANGE
+            and result.raised < _MAX_HEIGHT_CHANGE
+            and result.residual < RESIDUAL_IN_FLIGHTS
+        )
         near = near and _range_excess(result.clip) < max(_range_excess(even_clip), 0.0) + _MAX_ADDED_EXCESS
         if near or cycle.kind != "open":
             break

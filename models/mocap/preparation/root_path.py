@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import sole_points, with_neighbours
-from models.mocap.preparation.stances import sliding_support
+from models.mocap.preparation.stances import sliding_spheres
 
 # σ [s]: about a frame of 30 Hz captures; the optimisation of the dynamics smooths further. With half and twice the
 # value a punch of DeepMimic has a residual of 4.5 and 4.6 % of body weight, with this value 5.6 % (14.3 % if it is not
@@ -25,7 +25,7 @@ from models.mocap.preparation.stances import sliding_support
 _SMOOTHING = 0.04
 
 
-def on_resting_support(clip: Clip, smooth: Clip) -> Clip:
+def without_foot_sliding(clip: Clip, smooth: Clip) -> Clip:
     """The clip with its root shifted over the floor so that the supporting foot does not slide.
 
     Parameters
@@ -37,7 +37,7 @@ def on_resting_support(clip: Clip, smooth: Clip) -> Clip:
     """
     n = clip.n_frames
     poses, smooth_poses, first = with_neighbours(clip, smooth)
-    bearing = sliding_support(poses, smooth_poses, clip.fps)
+    bearing = sliding_spheres(poses, smooth_poses, clip.fps)
     if not bearing.any():
         return clip
     velocities = np.gradient(sole_points(smooth_poses)[:, :, :2], axis=0) * clip.fps

@@ -4,7 +4,7 @@ import numpy as np
 
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.dynamics.floor_forces import WITH_HANDS
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.poses import contact_points
@@ -12,7 +12,7 @@ from models.mocap.preparation.stances import Stances
 
 # Half or twice the first of these bounds changes the faults found in 6 and 3 of 26 clips (nine embedded clips and 17
 # captures); half or twice the others changes none.
-AT_REST = 0.2  # speed above which a part of a sole rolls on or off the floor, and is not on it [m/s]
+MAX_REST_SPEED = 0.2  # speed above which a part of a sole rolls on or off the floor, and is not on it [m/s]
 _MIN_LOAD = 0.02  # vertical force below which a contact point that moves is in swing [body weights]
 _MAX_FLOOR_HEIGHT = 0.015  # height above which a contact point does not skate [m]
 
@@ -35,13 +35,13 @@ def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
     """
     points, speeds = moving_points(clip, schedule)
     low = points[:, :, 2] - CONTACT_RADIUS < _MAX_FLOOR_HEIGHT
-    swinging = (loads < _MIN_LOAD) & (speeds > AT_REST)
+    swinging = (loads < _MIN_LOAD) & (speeds > MAX_REST_SPEED)
     return stance_slides(points, schedule.standing & low & ~swinging)
 
 
 def moving_points(clip: Clip, schedule: Stances) -> tuple[Array, Array]:
     """Places (n, k, 3) [m] and speeds (n, k) [m/s] of the contact points of a schedule."""
-    points = contact_points(clip.poses, WITH_HANDS[: schedule.standing.shape[1]])
+    points = contact_points(clip.poses, ALL_CONTACTS[: schedule.standing.shape[1]])
     if clip.n_frames < 2:
         return points, np.zeros(points.shape[:2])
     return points, np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps

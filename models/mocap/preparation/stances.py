@@ -18,14 +18,14 @@ from models.arrays import Array, Mask
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, soles
 from models.mocap.dynamics.contacts import standing_parts
-from models.mocap.dynamics.floor_forces import WITH_HANDS
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.dynamics.spacetime import LAG
+from models.mocap.dynamics.spacetime import LOAD_DELAY
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.motion.spans import cleaned, spans
-from models.mocap.preparation.foot_places import LOADED, lying, place_foot, turns
-from models.mocap.preparation.hand_stances import bear_longer, bearing_hands
+from models.mocap.preparation.foot_places import MIN_LOAD, flat_sole, foot_turns, place_foot
+from models.mocap.preparation.hand_stances import extend_hand_stances, loaded_hands
 from models.mocap.preparation.poses import contact_points, sole_points, with_neighbours
 
 # Half or twice any of the next values, down to `_LOAD_SMOOTHING`, changes whether a sphere stands in at most 0.9 % of
@@ -96,7 +96,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     """
     # With a lap before and after: a stance across the seam has one place, however long it is.
     poses, calm, first = with_neighbours(clip, smooth)
-    points, fps = contact_points(poses, WITH_HANDS), clip.fps
+    points, fps = contact_points(poses, ALL_CONTACTS), clip.fps
     parts, hands, load = _find_stances(poses, points, calm, fps)
     if not hands.any():
         points, hands = points[:, :_N_SOLES], hands[:, :0]
@@ -111,7 +111,7 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
         )
         for start, end in spans(np.any(parts[:, foot], axis=1)):
             stance = slice(start, end)
-            turning = turns(rate[stance], load[stance], fps)
+            turning = foot_turns(rate[stance], load[stance], fps)
             place_foot(
                 points[stance, spheres], yaw[stance], soles()[spheres], parts[stance, foot], turning,
                 standing[stance, spheres], places[stance, spheres],
@@ -121,21 +121,21 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
             places[start:end, palm, :2] = np.median(points[start:end, palm, :2], axis=0)
     sliding = np.zeros_like(standing)
     sliding[:, :_N_SOLES] = _sliding_spheres(points[:, :_N_SOLES], parts, hands, load, fps)
-    lag = max(1, round(LAG * fps))
+    lag = max(1, round(LOAD_DELAY * fps))
     firm = standing.copy()
     for shift in range(1, lag + 1):
         firm[shift:] &= standing[:-shift]
         firm[:-shift] &= standing[shift:]
     pushing = firm | sliding
     # In frames under load in which nothing else may bear it, standing spheres bear load without the lag.
-    unsupported = ~pushing.any(axis=1) & (load > LOADED)
+    unsupported = ~pushing.any(axis=1) & (load > MIN_LOAD)
     pushing[unsupported] |= standing[unsupported]
     kept = _hold_weights(standing, places, round(_HOLD_FADE_TIME * fps))
     frames = slice(first, first + clip.n_frames)
     return Stances(standing[frames], pushing[frames], places[frames], sliding[frames] & ~standing[frames], kept[frames])
 
 
-def sliding_support(poses: Array, calm: Array, fps: float) -> Mask:
+def sliding_spheres(poses: Array, calm: Array, fps: float) -> Mask:
     """Which contact spheres of the feet bear load without resting, shape (n, 8).
 
     Parameters
@@ -145,11 +145,11 @@ def sliding_support(poses: Array, calm: Array, fps: float) -> Mask:
     fps : float
         Frame rate [1/s].
     """
-    points = contact_points(poses, WITH_HANDS)
+    points = contact_points(poses, ALL_CONTACTS)
     return _sliding_spheres(points[:, :_N_SOLES], *_find_stances(poses, points, calm, fps), fps)
 
 
-def rested(schedule: Stances, clip: Clip) -> Stances:
+def with_feet_at_rest(schedule: Stances, clip: Clip) -> Stances:
     """The contact schedule with both feet flat on the floor at the upright ends of an open clip.
 
     Parameters
@@ -174,7 +174,7 @@ def rested(schedule: Stances, clip: Clip) -> Stances:
                 place = schedule.places[frame, spheres]
             else:
                 yaw = float(quaternions.heading(rotations[frame, BODIES.index(f"{side}_foot")]))
-                place = lying(points[None, frame, spheres], soles()[spheres], yaw, [0, 1, 2, 3])
+                place = flat_sole(points[None, frame, spheres], soles()[spheres], yaw, [0, 1, 2, 3])
             result.places[frames, spheres] = place
             result.standing[frames, spheres] = result.pushing[frames, spheres] = True
             result.sliding[frames, spheres] = False
@@ -220,11 +220,11 @@ def _find_stances(poses: Array, points: Array, calm: Array, fps: float) -> tuple
     """
     soles_at = points[:, :_N_SOLES]
     parts = standing_parts(soles_at, poses[:, :2], fps)
-    hands = bearing_hands(points, poses, calm, _sphere_mask(parts), fps)
+    hands = loaded_hands(points, poses, calm, _sphere_mask(parts), fps)
     load = _vertical_load(calm, fps)
     if hands.any():
         for start, end in spans(_is_unsupported(parts, hands, load, fps)):
-            bear_longer(points[:, _N_SOLES:], hands, start, end, _MAX_EXTENDED_TRAVEL)
+            extend_hand_stances(points[:, _N_SOLES:], hands, start, end, _MAX_EXTENDED_TRAVEL)
     for start, end in spans(_is_unsupported(parts, hands, load, fps)):
         _extend_stance(soles_at, parts, start, end)
     return parts, hands, load
@@ -238,7 +238,7 @@ def _sphere_mask(parts: Mask) -> Mask:
 def _is_unsupported(parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
     """Whether nothing stands although the body is under load, shape (n,)."""
     stands = parts.any(axis=(1, 2)) | hands.any(axis=1)
-    return cleaned(~stands & (load > LOADED), round(0.03 * fps), 2)
+    return cleaned(~stands & (load > MIN_LOAD), round(0.03 * fps), 2)
 
 
 def _sliding_spheres(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:

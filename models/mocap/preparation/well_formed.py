@@ -13,24 +13,24 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import CLOSES, Clip, global_rotations, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, global_rotations, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import (
-    FLATTEST,
-    FLIGHT,
-    FLYING,
-    HIGHEST,
-    LIMIT,
-    LOWEST,
-    RESIDUAL,
-    REST,
-    SEAM,
-    SKATE,
-    beyond,
+    MAX_END_SPEED,
+    MAX_FLIGHT_ACCELERATION_ERROR,
+    MAX_LIMIT_EXCESS,
+    MAX_RESIDUAL,
+    MAX_SEAM_VELOCITY_JUMP,
+    MAX_SKATE,
+    MAX_SOLE_HEIGHT,
+    MAX_SOLE_TILT,
+    MIN_SOLE_HEIGHT,
+    RESIDUAL_IN_FLIGHTS,
+    exceeding_text,
 )
-from models.mocap.preparation.feasible import Borne, borne
-from models.mocap.preparation.poses import around, resampled, smoothed
-from models.mocap.preparation.skate import AT_REST, moving_points, skates
+from models.mocap.preparation.feasible import ContactForces, contact_forces
+from models.mocap.preparation.poses import extend_periodically, resampled, smoothed
+from models.mocap.preparation.skate import MAX_REST_SPEED, moving_points, skates
 from models.mocap.preparation.stances import stances
 
 # Half or twice either value finds the same outliers in the nine embedded clips and 17 captures.
@@ -94,30 +94,43 @@ class WellFormed:
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
         found: list[str] = []
-        if self.lowest < LOWEST or self.highest > HIGHEST:
+        if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT:
             found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
-        if self.tilt > FLATTEST:
-            found.append(f"soles are tilted by {beyond(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
-        if self.skate > SKATE:
+        if self.tilt > MAX_SOLE_TILT:
+            found.append(f"soles are tilted by {exceeding_text(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
+        if self.skate > MAX_SKATE:
             found.append(
-                f"feet skate by {beyond(1000 * self.skate, 1000 * SKATE)} mm in a stance; {1000 * SKATE:.0f} at most"
+                f"feet skate by {exceeding_text(1000 * self.skate, 1000 * MAX_SKATE)} mm in a stance; "
+                f"{1000 * MAX_SKATE:.0f} at most"
             )
         if self.outliers:
             found.append(f"{self.outliers} frames stand out by their acceleration; 0 at most")
-        if self.closed and self.seam > SEAM:
-            found.append(f"velocities at the seam differ by {beyond(self.seam, SEAM)} rad/s; {SEAM} at most")
-        if not self.closed and self.seam > REST:
-            found.append(f"an end moves with {beyond(self.seam, REST)} rad/s; rest at both, {REST} at most")
-        if self.falling > FLIGHT:
-            found.append(f"flights fall with {beyond(self.falling, FLIGHT)} m/s² beside gravity; {FLIGHT} at most")
-        if self.excess > LIMIT:
-            found.append(f"a joint is {beyond(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
-        if self.residual > (bound := FLYING if self.flights else RESIDUAL):
+        if self.closed and self.seam > MAX_SEAM_VELOCITY_JUMP:
             found.append(
-                f"contact lacks {beyond(100 * self.residual, 100 * bound)} % of weight RMS; {100 * bound:.0f} % at most"
+                f"velocities at the seam differ by {exceeding_text(self.seam, MAX_SEAM_VELOCITY_JUMP)} rad/s; "
+                f"{MAX_SEAM_VELOCITY_JUMP} at most"
+            )
+        if not self.closed and self.seam > MAX_END_SPEED:
+            found.append(
+                f"an end moves with {exceeding_text(self.seam, MAX_END_SPEED)} rad/s; rest at both, "
+                f"{MAX_END_SPEED} at most"
+            )
+        if self.falling > MAX_FLIGHT_ACCELERATION_ERROR:
+            found.append(
+                f"flights fall with {exceeding_text(self.falling, MAX_FLIGHT_ACCELERATION_ERROR)} m/s² beside gravity; "
+                f"{MAX_FLIGHT_ACCELERATION_ERROR} at most"
+            )
+        if self.excess > MAX_LIMIT_EXCESS:
+            found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
+        if self.residual > (bound := RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
+            found.append(
+                f"contact lacks {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
+                f"{100 * bound:.0f} % at most"
             )
         if self.strain > 1.0:
-            found.append(f"{self.joint} needs {beyond(100 * self.strain, 100.0)} % of its torque limit; 100 % at most")
+            found.append(
+                f"{self.joint} needs {exceeding_text(100 * self.strain, 100.0)} % of its torque limit; 100 % at most"
+            )
         return tuple(found)
 
     def lines(self) -> tuple[str, ...]:
@@ -146,14 +159,18 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         a closed clip is in flight at its seam.
     """
     clip = resampled(clip, 120.0) if clip.n_frames > 2 else clip
-    closed = clip.closes(CLOSES)
+    closed = clip.closes(CLOSURE_TOLERANCE)
     schedule = stances(clip, smoothed(clip))
     points, speeds = moving_points(clip, schedule)
     heights = points[:, :, 2] - CONTACT_RADIUS
-    standing = schedule.standing & (speeds < AT_REST)
+    standing = schedule.standing & (speeds < MAX_REST_SPEED)
     soles = standing[:, : len(FOOT_CONTACTS)]
     low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
-    forces = borne(clip, schedule) if clip.n_frames > 8 else Borne(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
+    forces = (
+        contact_forces(clip, schedule)
+        if clip.n_frames > 8
+        else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
+    )
     slides = skates(clip, schedule, forces.loads)
     return WellFormed(
         clip.duration, float(low), float(high), _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
@@ -168,7 +185,7 @@ def outliers(clip: Clip) -> int:
     """Number of frames with a joint acceleration far above the median of the half second around them."""
     if clip.n_frames < 8:
         return 0
-    poses = around(clip, 2)[0] if clip.closes(CLOSES) else clip.poses
+    poses = extend_periodically(clip, 2)[0] if clip.closes(CLOSURE_TOLERANCE) else clip.poses
     steps = pose_difference(poses[:-1], poses[1:])[:, 3:]
     accelerations = np.sqrt(np.mean((np.diff(steps, axis=0) * clip.fps**2) ** 2, axis=1))
     width = max(3, round(clip.fps / 4.0))

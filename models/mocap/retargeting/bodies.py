@@ -13,7 +13,7 @@ from models.mocap.retargeting.skeleton_roles import ancestry, has_legs, joints_b
 _MAX_COPY_DISTANCE = 0.1
 
 
-def bodies(motion: SourceMotion) -> tuple[tuple[int, ...], ...]:
+def people_hips(motion: SourceMotion) -> tuple[tuple[int, ...], ...]:
     """Hips of each person in a file: the joints at which a left and a right leg meet.
 
     Skeletons whose hips stay at the same place, such as control rigs, belong to one person: their hips are one tuple.
@@ -32,7 +32,7 @@ def bodies(motion: SourceMotion) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(copies) for copies in people)
 
 
-def of_one_body(motion: SourceMotion, found: Sequence[int], joint: int) -> SourceMotion:
+def extract_body(motion: SourceMotion, found: Sequence[int], joint: int) -> SourceMotion:
     """A motion with only the body that a joint belongs to; the joints of the other bodies are dropped.
 
     Parameters

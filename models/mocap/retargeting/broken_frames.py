@@ -32,7 +32,7 @@ _MAX_GAP_STEP_RATIO = 0.3  # largest step across a gap, as a fraction of the sma
 # one (0.31 to 0.9 in two captures), and largest distance between before and after, relative to the former.
 _MIN_APPROACH_RATIO, _MAX_RETURN_RATIO = 0.3, 0.1
 _MIN_JOINT_FRACTION = 0.25  # least fraction of the joints that jump at once if the whole pose jumps
-FEWEST = 10  # least number of frames that define usual steps
+MIN_FRAME_COUNT = 10  # least number of frames that define usual steps
 _NEIGHBOUR_COUNT = 3  # frames on either side of a gap from which it is interpolated
 
 
@@ -69,7 +69,7 @@ class Repaired(NamedTuple):
     joints: tuple[JointJump, ...]
 
 
-def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
+def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
     """Interpolate short gaps whose neighbours agree with each other but not with the frames between.
 
     Both jumps of a gap are large compared with the usual steps of a joint, and the step across it is small compared
@@ -78,7 +78,7 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
     it is `rest`, a frame that is stated to show the rest pose.
     """
     broken = np.zeros(motion.n_frames, dtype=bool)
-    if motion.n_frames < FEWEST:
+    if motion.n_frames < MIN_FRAME_COUNT:
         return Repaired(motion, (), (), False, ())
     used = used_joints(motion, roles)
     longest = max(1, int(_MAX_GAP_TIME * motion.fps))
@@ -114,12 +114,12 @@ def repaired(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Rep
     return Repaired(motion, _indices(broken), _indices(jumping), shortened, joints)
 
 
-def begins_off(motion: SourceMotion, roles: Roles) -> bool:
+def first_step_jumps(motion: SourceMotion, roles: Roles) -> bool:
     """Whether the first step of a joint or the root is large compared with its usual steps and with the second.
 
     Of some 220 captures by other people, only those with a leading calibration pose have such a step.
     """
-    return motion.n_frames >= FEWEST and any(track.begins_with_jump() for track in _tracks(motion, roles))
+    return motion.n_frames >= MIN_FRAME_COUNT and any(track.begins_with_jump() for track in _tracks(motion, roles))
 
 
 def used_joints(motion: SourceMotion, roles: Roles) -> list[int]:

@@ -27,9 +27,9 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
-from models.mocap.retargeting.segment_frames import carried, frames
+from models.mocap.retargeting.segment_frames import frames, with_constant_offset
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
-from models.mocap.retargeting.sole_calibration import calibrated_foot, flat_frames
+from models.mocap.retargeting.sole_calibration import calibrated_foot, foot_flat_frames
 
 _Z = np.array([0.0, 0.0, 1.0])
 # Standard deviation of the weight w over the angle between trunk and thighs: half the value turns the joints of 19
@@ -105,7 +105,7 @@ def calibrate(
             body.set(f"{SIDES[k]}_foot", body.segment(f"{SIDES[k]}_shank"))
             counts.append(0)
             continue
-        flat = flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
+        flat = foot_flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
         shank = body.segment(f"{SIDES[k]}_shank")
         sole, used = calibrated_foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
         body.set(f"{SIDES[k]}_foot", sole)
@@ -170,7 +170,7 @@ def _set_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
             body.set(name, body.segment("pelvis"))
             continue
         target = quaternions.product(frames(left, trunk), quaternions.conjugate(own_trunk))
-        rotations = carried(source, target, straight)
+        rotations = with_constant_offset(source, target, straight)
         if name == "pelvis":
             # In rigs with extra hip joints beside the pelvis, the hip line turns relative to the pelvis.
             side = quaternions.rotated(rotations, np.array([0.0, 1.0, 0.0]))
@@ -181,7 +181,7 @@ def _set_trunk(body: _Body, lines: BodyLines, straight: Array) -> None:
     chest = body.segment("chest")
     for name in ("left_clavicle", "right_clavicle"):
         source = body.source(name)
-        body.set(name, chest if source is None else carried(source, chest, straight))
+        body.set(name, chest if source is None else with_constant_offset(source, chest, straight))
 
 
 def _set_head(body: _Body, up: Array, straight: Array) -> None:
@@ -196,11 +196,11 @@ def _set_head(body: _Body, up: Array, straight: Array) -> None:
         return
     upright = straight * (quaternions.rotated(chest, _Z) @ up > _MIN_UPRIGHT_COSINE)
     if upright.sum() < 1e-6:
-        body.set("head", carried(source, chest, straight))
+        body.set("head", with_constant_offset(source, chest, straight))
         return
     left = quaternions.rotated(chest, np.array([0.0, 1.0, 0.0]))
     left = unit(left - (left @ up)[:, None] * up)
-    body.set("head", carried(source, frames(left, np.broadcast_to(up, left.shape)), upright))
+    body.set("head", with_constant_offset(source, frames(left, np.broadcast_to(up, left.shape)), upright))
 
 
 def _set_limbs(body: _Body, lines: BodyLines, k: int, weights: Array) -> None:
@@ -221,7 +221,7 @@ def _set_limbs(body: _Body, lines: BodyLines, k: int, weights: Array) -> None:
             ),
         )
     hand, forearm = body.source(f"{side}_hand"), body.segment(f"{side}_forearm")
-    body.set(f"{side}_hand", forearm if hand is None else carried(hand, forearm, weights))
+    body.set(f"{side}_hand", forearm if hand is None else with_constant_offset(hand, forearm, weights))
 
 
 def _figure_trunk_frame(has_arms: bool) -> Array:
@@ -269,7 +269,7 @@ def _limb_rotations(
     """
     axis, sign = along
     if np.isnan(bone).any():
-        return parent if source is None else carried(source, parent, weights)
+        return parent if source is None else with_constant_offset(source, parent, weights)
     bone = unit(bone)
     straight = quaternions.product(quaternions.arcs(sign * quaternions.rotated(parent, np.eye(3)[axis]), bone), parent)
     parent_axis = quaternions.rotated(straight, np.eye(3)[across])

@@ -44,7 +44,7 @@ _ALL = slice(None)
 _FEET = tuple(BODIES.index(f"{side}_foot") for side in ("left", "right"))
 
 
-def on_the_floor(root: Array, segments: Array, fps: float, counted: Mask | slice = _ALL) -> tuple[Array, Array]:
+def put_on_floor(root: Array, segments: Array, fps: float, counted: Mask | slice = _ALL) -> tuple[Array, Array]:
     """The motion shifted vertically by a constant onto the floor, with feet pitched up where toes would penetrate it.
 
     Parameters
@@ -94,7 +94,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     Parameters
     ----------
     root, segments, fps
-        As in `on_the_floor`.
+        As in `put_on_floor`.
     """
     points = (root[:, None] + _ankle_positions(segments))[:, :, None] + quaternions.rotated(
         segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3)

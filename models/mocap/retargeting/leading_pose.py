@@ -25,7 +25,7 @@ from models.arrays import Array, Mask
 from models.mocap.motion import quaternions
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import BodyLines, unit
-from models.mocap.retargeting.broken_frames import FEWEST, begins_off, used_joints
+from models.mocap.retargeting.broken_frames import MIN_FRAME_COUNT, first_step_jumps, used_joints
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 # Half or twice any of these values finds no such pose in 17 captures, none of which has one.
@@ -47,7 +47,7 @@ _MIN_STRAIGHT_COSINE, _MIN_SYMMETRY_COSINE = np.cos(np.deg2rad([20.0, 12.0]))
 _MIN_OUTWARD_SINE, _MAX_FORWARD_SINE = np.sin(np.deg2rad([30.0, 25.0]))
 
 
-def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
+def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     """Number of frames of a calibration pose in front of a motion."""
     used = used_joints(motion, roles)
     rotations = motion.rotations[:, used]
@@ -63,7 +63,7 @@ def leading_frames(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
     is_early = ended <= _MAX_POSE_FRACTION * motion.n_frames or _first_change(_rms_angle(turns)) == begun
     is_pose = is_early and (at_rest[: begun + 1].all() or _is_calibration_pose(lines))
     frames = max(jumped, ended) if is_pose else jumped
-    return frames or int(begins_off(motion, roles))
+    return frames or int(first_step_jumps(motion, roles))
 
 
 def _frames_before_jump(rotations: Array, turns: Array, at_rest: Mask, lines: BodyLines) -> int:
@@ -74,7 +74,7 @@ def _frames_before_jump(rotations: Array, turns: Array, at_rest: Mask, lines: Bo
     early = steps[: max(share, first_change + 1)]
     if early.max() < _MIN_JUMP_ANGLE:
         return 0
-    if n >= FEWEST and first_change < share:
+    if n >= MIN_FRAME_COUNT and first_change < share:
         jump = int(np.argmax(early))
         usual = float(np.quantile(np.delete(steps, jump), 0.99))
         # The pose must be held; if there is motion before the jump, the jump is a fault of the capture.
@@ -112,7 +112,7 @@ def _first_change(steps: Array) -> int:
 
 def _find_blend(rotations: Array, steps: Array, longest: int) -> tuple[int, int]:
     """First step, and the one after the last, of a jump by steps that are all larger than the motion's; else (0, 0)."""
-    if longest < 2 or len(steps) < max(FEWEST, 4 * longest):
+    if longest < 2 or len(steps) < max(MIN_FRAME_COUNT, 4 * longest):
         return 0, 0
     usual = float(np.quantile(np.sort(steps)[:-longest], 0.99))
     large = steps > _MIN_BLEND_RATIO * usual

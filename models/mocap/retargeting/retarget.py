@@ -20,11 +20,11 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.abdomen import with_abdomen
 from models.mocap.retargeting.arm_twist import with_twist_shared
 from models.mocap.retargeting.body_lines import BodyLines, body_lines
-from models.mocap.retargeting.broken_frames import repaired
+from models.mocap.retargeting.broken_frames import repair_frames
 from models.mocap.retargeting.calibration import Calibration, calibrate
-from models.mocap.retargeting.footing import levelled, on_the_floor
+from models.mocap.retargeting.footing import levelled, put_on_floor
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.leading_pose import leading_frames
+from models.mocap.retargeting.leading_pose import calibration_pose_length
 from models.mocap.retargeting.leg_proportions import hips_over_feet
 from models.mocap.retargeting.retarget_report import (
     RetargetReport,
@@ -33,15 +33,15 @@ from models.mocap.retargeting.retarget_report import (
     calibration_remarks,
     endless_limb_remarks,
     frame_remarks,
-    haste_remarks,
-    held_remarks,
     in_place_remarks,
     joint_jump_remarks,
+    leg_speed_remarks,
+    padding_remarks,
     unit_name,
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import check_sides, check_stature, propped_seconds, up_axis
+from models.mocap.retargeting.upright import check_biped, check_sides, unsupported_time, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
@@ -79,12 +79,12 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     """
     rest = hints.rest_frame
     _check_channels(motion, rest)
-    motion, broken, jumps, shortened, joint_jumps = repaired(motion, roles, rest)
+    motion, broken, jumps, shortened, joint_jumps = repair_frames(motion, roles, rest)
     frames = _frames(motion, roles, rest)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
     body = joints_below(roles.segments["pelvis"], motion.parents)
-    check_stature(motion, lines)
+    check_biped(motion, lines)
     up = up_axis(motion, roles, lines, frames.positions[:, body], hints.up)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, frames.positions)
@@ -103,16 +103,16 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     if slope:  # levelling changes the heading of a body that does not face along the slope
         facing = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
-    propped = propped_seconds(lines, frames.positions[:, body], up.axis, motion.fps)
+    propped = unsupported_time(lines, frames.positions[:, body], up.axis, motion.fps)
     broken, jumps = ([k for k in indices if k >= frames.dropped] for indices in (broken, jumps))
     filled = lines.filled(motion.fps)[skipped:]
     lengths = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
     counted = ~filled & np.repeat(2 * lengths >= lengths.max(), lengths)  # not short pieces between jumps
-    clip = Clip(_poses(*on_the_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
+    clip = Clip(_poses(*put_on_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
-        *held_remarks(filled, motion.fps, frames.dropped),
-        *haste_remarks(legs, motion.fps),
+        *padding_remarks(filled, motion.fps, frames.dropped),
+        *leg_speed_remarks(legs, motion.fps),
         *in_place_remarks(path, hip_to_ankle, motion.fps),
         *joint_jump_remarks([jump for jump in joint_jumps if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
@@ -153,7 +153,7 @@ def _frames(motion: SourceMotion, roles: Roles, rest: int | None) -> _Frames:
     rotations = motion.global_rotations()
     positions = motion.global_positions(rotations)
     lines = body_lines(motion, roles, positions, rotations)
-    dropped = leading_frames(motion, roles, lines)
+    dropped = calibration_pose_length(motion, roles, lines)
     first = 0 if rest is not None and rest < dropped else dropped
     if first:
         rotations, positions = rotations[first:], positions[first:]

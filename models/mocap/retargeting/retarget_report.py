@@ -36,7 +36,9 @@ _MIN_DEPTH = 0.1  # least depth below the floor that is reported [m]: in the sam
 # Legs of a human, hip to ankle [m]: 0.49 of an adult's stature (Winter 2009, figure 4.1), 1.33 m for the tallest known;
 # about 0.3 m for a child that begins to walk. Wrong units are off by factors above 2, so the bounds may be wide.
 _MIN_LEG_LENGTH, _MAX_LEG_LENGTH = 0.3, 1.5
-COARSE = 10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
+MIN_FRAME_RATE = (
+    10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
+)
 # Speed of an ankle relative to its hip [m/s] that no leg exceeds for a tenth of a capture, and the quantile: 8 in a
 # file of a kick, 15 in the fastest of some 450 captures, an estimate from video; a walk has 3.
 _MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
@@ -167,7 +169,7 @@ def frame_remarks(
     if not timed:
         remark = f"the file states no frame rate: {fps:g} a second are assumed"
         yield f"{remark}; if it is another, state it with --frame-rate"
-    if fps < COARSE:
+    if fps < MIN_FRAME_RATE:
         remark = f"a frame lasts {two_digits(1.0 / fps)} s, longer than a camera's"
         yield f"{remark}: if that is not so, state its --frame-rate"
     if broken:
@@ -181,14 +183,14 @@ def frame_remarks(
         yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
 
 
-def held_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
+def padding_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
     """Padding frames (n,) at the ends of a motion; `fps` and `dropped` as in `floor_remarks`."""
     if filled.any():
         remark = f"nothing moves at all for {_duration_text(spans(filled), fps, dropped)}"
         yield f"{remark}, as where programs fill a motion up: soles, limbs and floor are told by the other frames"
 
 
-def haste_remarks(legs: Array, fps: float) -> Iterator[str]:
+def leg_speed_remarks(legs: Array, fps: float) -> Iterator[str]:
     """Legs that swing faster than a human's, as if the frame rate is stated ten times too high.
 
     Parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 from models.humanoid.skeleton import BODIES
 from models.mocap.readers.motion_file import MotionFileError, quoted, read_text
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.bodies import of_one_body
+from models.mocap.retargeting.bodies import extract_body
 from models.mocap.retargeting.skeleton_roles import LIMBS, Roles, ancestry, assembled, names_of, roles_of
 
 _ROLES = (*BODIES, *(f"{side}_{end}" for side in ("left", "right") for end in ("wrist", "toe")))
@@ -48,7 +48,7 @@ def stated_roles(
     ):
         raise MotionFileError(path, 0, f"no joint for {', '.join(missing)}", f'{missing[0]} = "NAME OF A JOINT"')
     hips = [joint for copies in people for joint in (copies if pelvis_only else copies[:1])]
-    motion = of_one_body(motion, hips, next(iter(whole.values()))) if len(hips) > 1 else motion
+    motion = extract_body(motion, hips, next(iter(whole.values()))) if len(hips) > 1 else motion
     named = _joints_of_roles(path, stated, motion)
     if pelvis_only:
         roles = roles_of(motion.joints, motion.parents, named["pelvis"])

@@ -17,7 +17,7 @@ def frames(left: Array, along: Array) -> Array:
     return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
 
 
-def carried(source: Array, wanted: Array, weights: Array) -> Array:
+def with_constant_offset(source: Array, wanted: Array, weights: Array) -> Array:
     """G C with C the mean of G⁻¹ T (Markley et al. 2007: the mean that minimises the chordal distance)."""
     offsets = Rotation.from_quat(quaternions.product(quaternions.conjugate(source), wanted), scalar_first=True)
     constant = np.asarray(offsets.mean(weights).as_quat(scalar_first=True))

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from models.arrays import Array
 from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
-from models.mocap.retargeting.segment_frames import carried
+from models.mocap.retargeting.segment_frames import with_constant_offset
 
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _MAX_ANGULAR_SPEED = 1.5  # angular velocity above which a foot rolls over heel or toe [rad/s]: 3 to 8 in a walk
@@ -41,7 +41,7 @@ _MIN_TOE_COMPONENT = 0.3
 _MIN_FRAME_COUNT = 3
 
 
-def flat_frames(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
+def foot_flat_frames(lines: BodyLines, k: int, source: Array, up: Array, fps: float) -> npt.NDArray[np.intp]:
     """Frames in which a foot stands on heel and toes: at rest, with its ankle near the lowest of the motion.
 
     They are found from the file's joints, since the figure's soles, and with them `contacts`, follow from these frames.
@@ -99,7 +99,7 @@ def calibrated_foot(
     up : array of shape (3,)
         Unit vector upwards.
     flat : array of int
-        Stance frames, from `flat_frames`.
+        Stance frames, from `foot_flat_frames`.
     straight : array of shape (frames,)
         Weights of the frames, by how nearly thighs and trunk are in line: ankles are then likely near their rest pose.
 
@@ -111,7 +111,7 @@ def calibrated_foot(
         from the toes of a single pose.
     """
     inverse = quaternions.conjugate(source)
-    resting = carried(source, shank, straight)
+    resting = with_constant_offset(source, shank, straight)
     neutral, forward = (quaternions.rotated(inverse, quaternions.rotated(resting, axis))[0] for axis in (_Z, _X))
     ahead = quaternions.rotated(inverse, unit(toes)).mean(axis=0)
     # A single pose has no mean ankle, and its feet may hang: whether they stand is decided by their toes.

@@ -250,7 +250,7 @@ def _distance_outside(lines: BodyLines, positions: Array, frames: IntArray, up: 
     return outside
 
 
-def propped_seconds(lines: BodyLines, positions: Array, up: Array, fps: float) -> float:
+def unsupported_time(lines: BodyLines, positions: Array, up: Array, fps: float) -> float:
     """Time for which the body's weight is beside its lowest joints [s]: on a chair, against a wall, on a rope.
 
     Parameters
@@ -268,7 +268,7 @@ def propped_seconds(lines: BodyLines, positions: Array, up: Array, fps: float) -
     return sum(end - start for start, end in spans(beside) if end - start > _MIN_PROPPED_TIME * fps) / fps
 
 
-def check_stature(motion: SourceMotion, lines: BodyLines) -> None:
+def check_biped(motion: SourceMotion, lines: BodyLines) -> None:
     """Refuse an animal with a human's joint names: its trunk is about as long as the legs, and across them throughout.
 
     Raises

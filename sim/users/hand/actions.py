@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.state import Array
 from sim.errors import SimError
 
@@ -59,7 +59,7 @@ class Push:
     radius: float = 0.01
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         numbers = [self.at, self.seconds, self.force, self.radius, *_values(self.direction), *_values(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a push has a number that is not finite: {self}")
@@ -144,7 +144,7 @@ class Grab:
     steady: bool = False
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *_values(self.place)]
         if not np.all(np.isfinite(numbers)):
             raise SimError(f"a grab has a number that is not finite: {self}")
@@ -227,7 +227,7 @@ class Turn:
     axis: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if not np.all(np.isfinite([self.at, self.seconds, self.angle, *self.axis])):
             raise SimError(f"a turn has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.at < 0.0 or abs(self.angle) > np.pi:

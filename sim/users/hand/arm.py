@@ -10,7 +10,7 @@ from numba import njit
 
 from controllers.easing import smooth_step, smooth_step_slope
 from controllers.state import Array
-from models.phantom.parameters import LEAST_TIP, PREMIUM_1_5
+from models.phantom.parameters import MIN_TIP_MASS, PREMIUM_1_5
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push, Turn, grab_at, grab_table, push_at, push_table, turn_table
 
@@ -245,7 +245,7 @@ class Arm:
         if self.turns:
             springs.append(("hand that turns the stylus", self.turn_stiffness, self.turn_damping, _STYLUS_INERTIA))
         if len(self.path) > 0 or self.grabs:
-            springs.append(("arm", self.stiffness, self.damping, LEAST_TIP))
+            springs.append(("arm", self.stiffness, self.damping, MIN_TIP_MASS))
         for holder, k, b, m in springs:
             max_step = 4.0 * m / (b + math.sqrt(b * b + 4.0 * k * m)) if k + b > 0.0 else math.inf
             if physics_step > max_step:

@@ -17,7 +17,7 @@ _SAMPLE_SPACING = 1e6  # [s] between the two samples of a path, longer than any 
 _ENDLESS_HOLD = 1e9  # [s] hold time of a grab
 _TREMOR_WAVES = ((8.7, 0.0), (9.6, 2.1), (10.9, 4.2))  # frequency [Hz] and phase [rad] along x, y, z
 
-TREMBLES = 1e-4
+TREMOR_AMPLITUDE = 1e-4
 """Amplitude of the physiological tremor of a hand at rest [m]: a tenth of a millimetre at 8 to 12 Hz."""
 
 
@@ -57,4 +57,4 @@ def tremor(t: float) -> Array:
     A real hand never holds still (Stiles 1976, J. Appl. Physiol. 40: 44-54), so the plausibility check of a device
     treats constant readings as a fault.
     """
-    return np.array([TREMBLES * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR_WAVES])
+    return np.array([TREMOR_AMPLITUDE * np.sin(2.0 * np.pi * rate * t + phase) for rate, phase in _TREMOR_WAVES])

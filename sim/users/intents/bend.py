@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, grab_table
@@ -31,7 +31,7 @@ class Bend:
     grabs: Sequence[Grab]
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if len(self.grabs) == 0:
             raise SimError("a person who bends a curve has no grabs; expected one or more")
         grab_table(self.grabs)

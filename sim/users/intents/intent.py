@@ -4,7 +4,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.easing import smooth_steps
 from controllers.state import Array
@@ -55,7 +55,7 @@ def check(intent: object, **numbers: tuple[float, float, float]) -> None:
     SimError
         If a number is outside its interval.
     """
-    check_kinds(intent)
+    check_field_types(intent)
     for name, (value, least, most) in numbers.items():
         if not least <= value <= most or np.isinf(value):
             expected = f"{least:g} to {most:g}" if most < np.inf else f"{least:g} or more, and finite"

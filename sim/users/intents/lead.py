@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.checks import numbers_of, of_kind
+from controllers.checks import check_kind, numbers_of
 from controllers.curves.trajectory import Trajectory
 from controllers.state import Array
 from sim.errors import SimError
@@ -39,7 +39,7 @@ class Lead:
         points = numbers_of("points", self.points)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.all(np.isfinite(points)):
             raise SimError(f"points of Lead are {reprlib.repr(self.points)}; expected rows of three finite numbers")
-        of_kind("period", self.period, float)
+        check_kind("period", self.period, float)
         if not 0.0 < self.period < np.inf:
             raise SimError(f"period of Lead is {self.period}; expected more than 0 s, and finite")
         object.__setattr__(self, "points", points)

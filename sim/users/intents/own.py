@@ -9,7 +9,7 @@ import numpy.typing as npt
 from numba import njit
 from numba.core.errors import NumbaError
 
-from controllers.checks import check_kinds, takes
+from controllers.checks import check_callable, check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.kernel_call import address_of
 from sim.errors import SimError
@@ -70,8 +70,8 @@ class Own:
     compiled: bool = False
 
     def __post_init__(self) -> None:
-        check_kinds(self)
-        takes("function", self.function, "t", "place", "force", *(("rows",) if self.compiled else ()))
+        check_field_types(self)
+        check_callable("function", self.function, "t", "place", "force", *(("rows",) if self.compiled else ()))
         if not (np.isfinite(self.every) and self.every > 0.0):
             raise SimError(f"an intent that is asked every {self.every} s; expected more than 0 s")
 

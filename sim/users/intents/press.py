@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.checks import check_kinds
+from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Push
@@ -31,7 +31,7 @@ class Press:
     pushes: Sequence[Push]
 
     def __post_init__(self) -> None:
-        check_kinds(self)
+        check_field_types(self)
         if len(self.pushes) == 0:
             raise SimError("a person who pushes has no pushes; expected one or more")
         if any(push.place is not None for push in self.pushes):

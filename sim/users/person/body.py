@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from controllers.state import Array
-from models.phantom.parameters import LEAST_TIP
+from models.phantom.parameters import MIN_TIP_MASS
 from sim.errors import SimError
 from sim.users.person.person import Person
 
@@ -46,8 +46,8 @@ def check_steps(person: Person, physics_step: float) -> None:
         If either condition is violated.
     """
     stiffening = 1.0 + person.stiffening * max(10.0 - REFERENCE_GRIP, 0.0)
-    max_step = min(LEAST_TIP / (stiffening * person.grip_damping),
-               math.sqrt(LEAST_TIP / (stiffening * person.grip_stiffness)))  # fmt: skip
+    max_step = min(MIN_TIP_MASS / (stiffening * person.grip_damping),
+               math.sqrt(MIN_TIP_MASS / (stiffening * person.grip_stiffness)))  # fmt: skip
     if physics_step > max_step:
         raise SimError(
             f"the fingers of person {person.name!r} need a physics step of {max_step:.2g} s or less, "

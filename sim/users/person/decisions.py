@@ -27,7 +27,7 @@ from sim.users.person.person_state import (
     PERIOD,
     REFRACTORY,
     STIFFENING,
-    STIFFER,
+    STIFFNESS_FACTOR,
     TARGET,
     TICKS,
     WANTED_FORCE,
@@ -40,11 +40,13 @@ from sim.users.person.wishes import GRIP as WISHED_GRIP
 ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] time constant with which a relaxed arm's rest position follows the hand
 RETAINED = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
-BEND = 0.1  # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
+DIFFERENCE_HALF_WIDTH = (
+    0.1  # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
+)
 
 
 @njit
-def want(person: PersonState, switch: Array) -> None:
+def act_on_wish(person: PersonState, switch: Array) -> None:
     """Read the current wish, begin a submovement if one is due, and follow the one in progress."""
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = work_array((3, 3)), work_array((3, 3))
@@ -73,7 +75,9 @@ def want(person: PersonState, switch: Array) -> None:
     grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
     activation_step = n[PERIOD] / ENGAGING_TIME
     m[ENGAGED_SHARE] += activation_step * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
-    m[STIFFER] += activation_step * (max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFER])
+    m[STIFFNESS_FACTOR] += activation_step * (
+        max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFNESS_FACTOR]
+    )
     for k in range(3):
         V[WANTED_FORCE, k] += activation_step * (row[FORCE + k] - V[WANTED_FORCE, k])
     if not engaged:
@@ -91,13 +95,13 @@ def want(person: PersonState, switch: Array) -> None:
 
 @njit
 def _predict_wanted_motion(rows: Array, period: float, t: float, goal: Array) -> None:
-    """Set the motion that will be wanted at time t [s]; its acceleration is a mean over ± `BEND`, even at corners."""
+    """Set the motion wanted at time t [s]; its acceleration is the mean over ± `DIFFERENCE_HALF_WIDTH`."""
     before, acceleration = work_array((3, 3)), work_array(3)
     before[:] = 0.0
-    wanted_motion(rows, period, t - BEND, before)
-    wanted_motion(rows, period, t + BEND, goal)
+    wanted_motion(rows, period, t - DIFFERENCE_HALF_WIDTH, before)
+    wanted_motion(rows, period, t + DIFFERENCE_HALF_WIDTH, goal)
     for k in range(3):
-        acceleration[k] = (goal[1, k] - before[1, k]) / (2.0 * BEND)
+        acceleration[k] = (goal[1, k] - before[1, k]) / (2.0 * DIFFERENCE_HALF_WIDTH)
     wanted_motion(rows, period, t, goal)
     goal[2] = acceleration
 

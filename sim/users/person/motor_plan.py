@@ -31,7 +31,7 @@ from sim.users.person.submovement import aimed_seconds, set_submovement, submove
 from sim.users.person.wishes import PLACE
 
 ACROSS = 0.85  # endpoint scatter across the direction over that along it (< 1: Gordon et al. 1994 I; value from memory)
-LEAST_SECONDS = 0.16  # [s] duration of the shortest submovement
+MIN_SUBMOVEMENT_TIME = 0.16  # [s] duration of the shortest submovement
 WATCHED = 0.8  # share of a submovement's duration (94 % of its length) after which its endpoint can be seen
 SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan that is corrected [m], and the delay [s]
 
@@ -79,7 +79,7 @@ def aim(person: PersonState, goal: Array, width: float) -> bool:
     if distance < 0.5 * width:
         return True
     overhead = n[PERIOD] * n[SEEN_TICKS]
-    seconds = aimed_seconds(2.0 * distance / width, n[CAUTION] * n[MOTOR_NOISE], overhead, LEAST_SECONDS)
+    seconds = aimed_seconds(2.0 * distance / width, n[CAUTION] * n[MOTOR_NOISE], overhead, MIN_SUBMOVEMENT_TIME)
     submove(person, goal, seconds)
     return False
 

@@ -26,7 +26,7 @@ from sim.users.person.person_state import (
     REFLEX,
     REFLEX_GAIN,
     SKILL,
-    STIFFER,
+    STIFFNESS_FACTOR,
     STRENGTH,
     TREMOR,
     UNSTEADY,
@@ -46,7 +46,7 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
     `p` and `v` are position and velocity of the stylus in H, shape (3,); see `sim.users.person.body`.
     """
     n, m, V = person.numbers, person.memory, person.vectors
-    engaged, stiffer = m[ENGAGED_SHARE], m[STIFFER]
+    engaged, stiffer = m[ENGAGED_SHARE], m[STIFFNESS_FACTOR]
     spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
     damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
     muscle, size, force_size = work_array(3), 0.0, 0.0

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from sim.errors import SimError
 
 
@@ -196,7 +196,7 @@ class Person:
     learning: float = 0.0
 
     def __post_init__(self) -> None:
-        of_kind("name", self.name, str)
+        check_kind("name", self.name, str)
         if self.hand not in ("right", "left"):
             raise SimError(f"the hand of person {self.name!r} is {self.hand!r}; expected right or left")
         for option in fields(self):

@@ -16,7 +16,7 @@ from sim.users.person.wishes import WISH_SIZE
 """Indices in `PersonState.numbers`: parameters of the person (for the tremor, of its filter), of her wishes, and delays
 in ticks."""
 
-(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFER, CALM,
+(STARTED, TICKS, CLOCK, BEGUN, LASTS, DECIDED, CAPACITY, TARGET, ENGAGED_SHARE, STIFFNESS_FACTOR, CALM,
  N_MEMORY) = range(12)  # fmt: skip
 """Indices in `PersonState.memory`: 1 once she has begun, ticks so far, her own clock [s], start and duration of the
 current submovement [s], time of the last decision [s], share of strength left after fatigue, number of the current
@@ -24,7 +24,8 @@ target, degree of muscle activation, impedance relative to that at the reference
 hand was where the submovement had it [s]."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,
- TREMOR, TREMOR_BEFORE, FELT_FORCE, MISFELT, SHOWN, VEERED, ASTRAY, N_VECTORS) = range(21)  # fmt: skip
+ TREMOR, TREMOR_BEFORE, FELT_FORCE, MISFELT, SHOWN, DIRECTION_ERROR, DIRECTION_ERROR_OFFSET,
+ N_VECTORS) = range(21)  # fmt: skip
 """Rows of `PersonState.vectors`, in H: the hand's position and velocity; the motion that the muscles drive it to
 (position, velocity, acceleration); the displacement intended so far; the correction of the felt position by vision;
 noise of the felt and of the seen position; her estimate of her hand's position; the force that she wants; the reflex
@@ -80,7 +81,7 @@ class PersonState(NamedTuple):
     eye: Eye
 
 
-def nobody() -> PersonState:
+def no_person() -> PersonState:
     """The empty state that the loop holds where there is no person."""
     none, square = np.zeros(0), np.zeros((0, 3))
     return PersonState(

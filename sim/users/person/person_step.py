@@ -11,7 +11,7 @@ from controllers.lent import Lent
 from controllers.state import Array
 from sim.compilation.units import Unit
 from sim.users.person.body import REFERENCE_GRIP
-from sim.users.person.decisions import want
+from sim.users.person.decisions import act_on_wish
 from sim.users.person.muscles import move
 from sim.users.person.person_state import (
     BELIEF,
@@ -27,9 +27,9 @@ from sim.users.person.person_state import (
     SHOWN,
     STARTED,
     STIFFENING,
-    STIFFER,
+    STIFFNESS_FACTOR,
     PersonState,
-    nobody,
+    no_person,
 )
 from sim.users.person.senses import sense
 
@@ -59,7 +59,7 @@ def person_step(
         if person.memory[STARTED] == 0.0:
             _begin(person, p, v)
         sense(person, p, force)
-        want(person, switch)
+        act_on_wish(person, switch)
     move(person, dt, p, v, force)
 
 
@@ -75,14 +75,14 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
         person.past[row, SENSED : SENSED + 3] = p
         person.past[row, SEEN : SEEN + 3] = p
     memory[STARTED], memory[CAPACITY] = 1.0, 1.0
-    memory[STIFFER] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
+    memory[STIFFNESS_FACTOR] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
     memory[DECIDED] = -person.numbers[REFRACTORY]
 
 
 def person_unit() -> Unit:
     """The compilation unit of `person_step`, separate so that a change in it does not recompile the loop."""
     number, vector = types.float64, typeof(np.zeros(3))
-    return Unit.of(person_step, Lent(typeof(nobody())), number, number, types.int64, vector, vector, vector, vector)
+    return Unit.of(person_step, Lent(typeof(no_person())), number, number, types.int64, vector, vector, vector, vector)
 
 
 def link_person(person: PersonState) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from controllers.checks import of_kind
+from controllers.checks import check_kind
 from sim.errors import SimError
 from sim.users.person.person import INTERVALS, Person
 
@@ -49,7 +49,7 @@ def persona(name: str) -> Person:
     SimError
         If there is no such person.
     """
-    of_kind("name", name, str)
+    check_kind("name", name, str)
     if name in PERSONAS:
         return PERSONAS[name]
     seed, _, place = name.partition(":")
@@ -81,8 +81,8 @@ def population(number: int, seed: int) -> tuple[Person, ...]:
     SimError
         If a number is outside its interval.
     """
-    of_kind("number", number, int)
-    of_kind("seed", seed, int)
+    check_kind("number", number, int)
+    check_kind("seed", seed, int)
     if not 1 <= number <= _MAX_SIZE:
         raise SimError(f"a population of {number}; expected 1 to {_MAX_SIZE} people")
     if seed < 0:

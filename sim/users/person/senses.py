@@ -12,11 +12,12 @@ from controllers.state import Array
 from controllers.work_array import work_array
 from sim.users.person.eye import seen_place
 from sim.users.person.person_state import (
-    ASTRAY,
     BELIEF,
     BLUR,
     DEVIATING,
     DEVIATION,
+    DIRECTION_ERROR,
+    DIRECTION_ERROR_OFFSET,
     DIRECTION_NOISE,
     DRIFT,
     DRIVEN_P,
@@ -49,7 +50,6 @@ from sim.users.person.person_state import (
     TREMOR_BEFORE,
     TREMOR_GAIN,
     UNSTEADY,
-    VEERED,
     WISH_PERIOD,
     PersonState,
 )
@@ -58,7 +58,7 @@ from sim.users.person.random_numbers import normal
 DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
 BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
 CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
-DOUBTED = 0.005  # [m] plus three times the felt noise: a place seen farther from the felt one is rejected
+REJECTION_DISTANCE = 0.005  # [m] plus three times the felt noise: a place seen farther from the felt one is rejected
 VEER_TIME = 0.5  # [s] correlation time of the error of felt direction, without which the steering law does not hold
 ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
 UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
@@ -69,7 +69,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     """Store what is felt and seen now, and update the estimate, reflexes and tremor from what arrives now."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
     _advance_noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
-    go_astray(person)
+    advance_direction_error(person)
     _advance_noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _advance_noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
     if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
@@ -81,7 +81,10 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     _update_vision(person, p)
     decay = math.exp(-n[PERIOD] / CALIBRATION_TIME)
     for k in range(3):
-        now[SENSED + k], now[SEEN + k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k], V[SHOWN, k] + V[BLUR, k]
+        now[SENSED + k], now[SEEN + k] = (
+            V[HAND_P, k] + V[DRIFT, k] + V[DIRECTION_ERROR_OFFSET, k],
+            V[SHOWN, k] + V[BLUR, k],
+        )
         now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
         now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
@@ -110,7 +113,7 @@ def _advance_noise(person: PersonState, which: int, deviation: float, seconds: f
 
 
 @njit
-def go_astray(person: PersonState) -> None:
+def advance_direction_error(person: PersonState) -> None:
     r"""Advance the error e of the felt position that arises because the felt direction of a movement is wrong.
 
     .. math:: \dot e = \delta \times v - e / T
@@ -118,12 +121,14 @@ def go_astray(person: PersonState) -> None:
     with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
     (Gordon, Ghilardi & Ghez 1994 I).
     """
-    _advance_noise(person, VEERED, person.numbers[DIRECTION_NOISE], VEER_TIME)
-    V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[VEERED]
+    _advance_noise(person, DIRECTION_ERROR, person.numbers[DIRECTION_NOISE], VEER_TIME)
+    V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[DIRECTION_ERROR]
     period = person.numbers[PERIOD]
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        V[ASTRAY, k] += period * (angle[i] * v[j] - angle[j] * v[i] - V[ASTRAY, k] / ASTRAY_TIME)
+        V[DIRECTION_ERROR_OFFSET, k] += period * (
+            angle[i] * v[j] - angle[j] * v[i] - V[DIRECTION_ERROR_OFFSET, k] / ASTRAY_TIME
+        )
 
 
 @njit
@@ -135,9 +140,11 @@ def _update_vision(person: PersonState, p: Array) -> None:
     elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
         felt, squared_distance = work_array(3), 0.0
         for k in range(3):
-            felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[ASTRAY, k]
+            felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[DIRECTION_ERROR_OFFSET, k]
         seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
         for k in range(3):
             squared_distance += (V[SHOWN, k] - felt[k]) ** 2
-        if squared_distance > (DOUBTED + 3.0 * person.numbers[FELT_NOISE]) ** 2:  # rejected: mistaken for another pose
+        if (
+            squared_distance > (REJECTION_DISTANCE + 3.0 * person.numbers[FELT_NOISE]) ** 2
+        ):  # rejected: mistaken for another pose
             V[SHOWN] = felt

@@ -12,7 +12,7 @@ from numba import njit
 
 from controllers.state import Array
 
-MOST_STAGES = 8  # largest number of submovements planned to a target; more would leave 1/2000 of the distance
+MAX_SUBMOVEMENTS = 8  # largest number of submovements planned to a target; more would leave 1/2000 of the distance
 
 
 @njit
@@ -77,7 +77,7 @@ def aimed_seconds(difficulty: float, scatter: float, overhead: float, least: flo
         D_min, duration of the shortest submovement [s].
     """
     shortest_total, seconds = np.inf, least
-    for n in range(1, MOST_STAGES + 1):
+    for n in range(1, MAX_SUBMOVEMENTS + 1):
         each = max(least, scatter * max(difficulty, 1.0) ** (1.0 / n))
         if n * (overhead + each) < shortest_total:
             shortest_total, seconds = n * (overhead + each), each

@@ -10,7 +10,7 @@ from collections.abc import Generator
 import casadi as ca
 import pytest
 
-from controllers.certificates.interrupts import heeding_interrupts
+from controllers.certificates.interrupts import raise_lost_interrupts
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def test_interrupt_ends_ipopt() -> None:
     options = {"print_time": 0, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 100_000}
     solve, timer = ca.nlpsol("solve", "ipopt", {"x": x, "f": cost}, options), threading.Timer(0.2, _interrupt)
     timer.start()
-    with pytest.raises(KeyboardInterrupt), heeding_interrupts():
+    with pytest.raises(KeyboardInterrupt), raise_lost_interrupts():
         solve(x0=0.3)  # some nine seconds without an interrupt
     timer.join()
     assert not solve.stats()["success"]
@@ -45,16 +45,16 @@ def _suppressed_interrupt() -> None:
 
 def test_interrupt_lost_within_the_block_is_raised_at_its_end() -> None:
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), heeding_interrupts():
+    with pytest.raises(KeyboardInterrupt), raise_lost_interrupts():
         _suppressed_interrupt()
     assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_block_without_interrupt_keeps_handler_and_exceptions() -> None:
     before = signal.getsignal(signal.SIGINT)
-    with heeding_interrupts():
+    with raise_lost_interrupts():
         pass
-    with pytest.raises(ZeroDivisionError), heeding_interrupts():
+    with pytest.raises(ZeroDivisionError), raise_lost_interrupts():
         _ = 1 / 0
     assert signal.getsignal(signal.SIGINT) is before
 
@@ -63,7 +63,7 @@ def test_other_threads_keep_the_signal_handler() -> None:
     before, handlers = signal.getsignal(signal.SIGINT), list[object]()
 
     def enter_block() -> None:
-        with heeding_interrupts():
+        with raise_lost_interrupts():
             handlers.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=enter_block)

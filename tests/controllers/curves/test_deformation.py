@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from controllers.curves import deformation
 from controllers.curves.closest_point import closest_phases
-from controllers.curves.deformation import bump, carry_to, commit, let_go, redo, take_hold, undo
-from controllers.curves.editing import curve_of, record_of, refined
+from controllers.curves.deformation import begin_edit, bump, commit, discard_edit, drag_to, redo, undo
+from controllers.curves.editing import curve_of, record_of, refine
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 
@@ -49,14 +49,14 @@ def curve(request: pytest.FixtureRequest) -> Trajectory:
 
 def _record(curve: Trajectory, depth: int = 64) -> np.ndarray:
     record = record_of(curve, WIDTH, depth)
-    let_go(record, 0)  # also updates the bounds of the segments, as after every edit
+    discard_edit(record, 0)  # also updates the bounds of the segments, as after every edit
     return record
 
 
 def _edited(curve: Trajectory, phase: float, delta: list[float]) -> np.ndarray:
     record = _record(curve)
-    assert take_hold(record, 0, phase)
-    carry_to(record, 0, *(curve.point(phase) + delta))
+    assert begin_edit(record, 0, phase)
+    drag_to(record, 0, *(curve.point(phase) + delta))
     commit(record, 0)
     return record
 
@@ -80,7 +80,7 @@ def test_bump_is_one_at_its_centre_compact_and_twice_differentiable() -> None:
 
 
 def test_refined_curve_equals_the_original(curve: Trajectory) -> None:
-    fine = refined(curve, 100)
+    fine = refine(curve, 100)
     assert len(fine.coefficients) > len(curve.coefficients)
     for name in ("point", "velocity", "acceleration", "orientation"):
         np.testing.assert_allclose(getattr(fine, name)(PHASES), getattr(curve, name)(PHASES), atol=1e-12)
@@ -93,8 +93,8 @@ def test_grabbed_point_follows_the_hand_and_the_rest_stays(phase: float, delta: 
         record = _record(curve)
         before = curve_of(record, 0, curve)
         p = curve.point(phase) + delta
-        assert take_hold(record, 0, phase)
-        carry_to(record, 0, *p)
+        assert begin_edit(record, 0, phase)
+        drag_to(record, 0, *p)
         bent = curve_of(record, 0, curve)
         assert np.abs(bent.point(phase) - p).max() < 1e-12
         away = np.abs((PHASES - phase + 2.0) % 4.0 - 2.0)
@@ -107,8 +107,8 @@ def test_grabbed_point_follows_the_hand_and_the_rest_stays(phase: float, delta: 
 def test_deformation_is_the_documented_sum_of_bumps(curve: Trajectory) -> None:
     record, bends = _record(curve), []
     for phase, delta in ((1.0, [0.01, 0.0, 0.0]), (1.2, [0.0, -0.02, 0.01]), (2.9, [0.0, 0.0, 0.03])):
-        assert take_hold(record, 0, phase)
-        carry_to(record, 0, *(curve_of(record, 0, curve).point(phase) + delta))
+        assert begin_edit(record, 0, phase)
+        drag_to(record, 0, *(curve_of(record, 0, curve).point(phase) + delta))
         centre, width, *weighted = record[deformation.PENDING : deformation.RECORD_HEADER]
         assert abs(centre - phase) <= WIDTH / 32 + 1e-12
         assert width == pytest.approx(WIDTH, rel=1 / 16)
@@ -143,7 +143,7 @@ def test_open_ends_keep_position_slope_and_curvature() -> None:
         for name in ("point", "velocity", "acceleration"):
             for end in (0.0, 4.0):
                 np.testing.assert_allclose(getattr(bent, name)(end), getattr(curve, name)(end), atol=1e-9)
-    assert not take_hold(_record(curve), 0, 0.05)
+    assert not begin_edit(_record(curve), 0, 0.05)
 
 
 def test_undo_and_redo_are_exact(curve: Trajectory) -> None:
@@ -151,9 +151,9 @@ def test_undo_and_redo_are_exact(curve: Trajectory) -> None:
     record = _record(curve)
     history = [_blob(record).copy()]
     for phase in (0.6, 2.0, 2.2, 3.4):
-        assert take_hold(record, 0, phase)
+        assert begin_edit(record, 0, phase)
         for _ in range(5):
-            carry_to(record, 0, *(curve_of(record, 0, curve).point(phase) + rng.normal(size=3) * 0.01))
+            drag_to(record, 0, *(curve_of(record, 0, curve).point(phase) + rng.normal(size=3) * 0.01))
         commit(record, 0)
         history.append(_blob(record).copy())
     for state in reversed(history[:-1]):
@@ -169,14 +169,14 @@ def test_undo_and_redo_are_exact(curve: Trajectory) -> None:
 def test_discarded_edit_leaves_no_trace_and_a_new_edit_clears_redo() -> None:
     record = _edited(_circle(), 1.0, [0.01, 0.0, 0.0])
     state = _blob(record).copy()
-    assert take_hold(record, 0, 1.1)
-    carry_to(record, 0, 0.0, 0.0, 0.05)
+    assert begin_edit(record, 0, 1.1)
+    drag_to(record, 0, 0.0, 0.0, 0.05)
     assert not np.array_equal(_blob(record), state)
-    let_go(record, 0)
+    discard_edit(record, 0)
     np.testing.assert_array_equal(_blob(record), state)
     undo(record, 0)
-    assert take_hold(record, 0, 3.0)
-    carry_to(record, 0, 0.0, -0.06, 0.0)
+    assert begin_edit(record, 0, 3.0)
+    drag_to(record, 0, 0.0, -0.06, 0.0)
     commit(record, 0)
     assert not redo(record, 0)
 
@@ -185,8 +185,8 @@ def test_edits_beyond_the_depth_cannot_be_undone() -> None:
     deep, shallow = _record(_circle()), _record(_circle(), depth=2)
     for k, phase in enumerate((0.5, 1.5, 2.5, 3.5, 0.7)):
         for record in (deep, shallow):
-            assert take_hold(record, 0, phase)
-            carry_to(record, 0, *(_circle().point(phase) * (1.0 + 0.1 * k)))
+            assert begin_edit(record, 0, phase)
+            drag_to(record, 0, *(_circle().point(phase) * (1.0 + 0.1 * k)))
             commit(record, 0)
     np.testing.assert_array_equal(_blob(deep), _blob(shallow))
     assert [undo(shallow, 0) for _ in range(3)] == [True, True, False]
@@ -198,8 +198,8 @@ def test_closest_point_is_exact_on_a_curve_being_bent(curve: Trajectory) -> None
     rng = np.random.default_rng(4)
     record = _record(curve)
     for phase in (0.4, 1.7, 3.5):
-        assert take_hold(record, 0, phase)
-        carry_to(record, 0, *(curve.point(phase) + rng.normal(size=3) * 0.03))
+        assert begin_edit(record, 0, phase)
+        drag_to(record, 0, *(curve.point(phase) + rng.normal(size=3) * 0.03))
         points = rng.normal(size=(60, 3)) * 0.05
         _, distances = closest_phases(_blob(record), points)
         # The bounds in the record are not the tight ones of `packed`, yet must find the same.

@@ -6,7 +6,7 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading
-from controllers.walking.gait import WITHIN, Gait, decide_flight, fresh_decision, share_of_stance
+from controllers.walking.gait import TRANSITION_FRACTION, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.walking.walker import walker_at
 from controllers.walking.walking import Walking
 
@@ -42,7 +42,7 @@ def test_grounded_figure_takes_off_above_the_take_off_pace(speed, ends):
     assert held[0] == 1.0
     assert held[-1] == ends
     # The end of the stance is the clip's own push-off.
-    assert np.all(held[np.linspace(0.0, 1.0, 201) > WITHIN] == ends)
+    assert np.all(held[np.linspace(0.0, 1.0, 201) > TRANSITION_FRACTION] == ends)
 
 
 @pytest.mark.parametrize(("speed", "ends"), [(2.6, 0.0), (2.4, 1.0)])
@@ -51,7 +51,7 @@ def test_flying_figure_lands_below_the_landing_pace(speed, ends):
     held, memory = decided(np.linspace(0.0, 1.0, 201), speed, memory)
     assert held[-1] == pytest.approx(ends, abs=1e-12)
     # The start of the stance is the clip's own landing.
-    assert np.all(held[np.linspace(0.0, 1.0, 201) < 1.0 - WITHIN] == 0.0)
+    assert np.all(held[np.linspace(0.0, 1.0, 201) < 1.0 - TRANSITION_FRACTION] == 0.0)
 
 
 def test_decision_holds_during_the_stance_and_in_the_air():

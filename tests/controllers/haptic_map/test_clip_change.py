@@ -7,20 +7,20 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange, gate_behind, known_between, packed_changes
+from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange, known_between, packed_changes, passed_gate
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import (
-    AHEAD,
-    CHANGE,
-    COURSE,
-    RIVER,
-    SHOWN,
+    ACTIVE_RIVER,
+    CLIP_PHASE,
+    LEAD,
+    TIMING_RIVER,
+    TRANSITION,
     begin_change,
     change_clip,
+    follow_other_curve,
     gate_passed,
-    knows_change,
+    has_transition,
     stop_clip,
-    take_course,
 )
 from tests.controllers.clips_for_maps import LEG, difference, swinging
 from tests.derivatives import central_differences
@@ -73,7 +73,7 @@ def test_changing_pose_is_the_second_clip_moved_by_the_offset_and_ends_as_that_c
         MAP.pose(_stylus(1, GATE + DURATION + 0.01), memory),
         MAP_WITHOUT_CHANGES.pose(_stylus(1, GATE + DURATION + 0.01), _memory(GATE + DURATION, False)), atol=1e-12,
     )  # fmt: skip
-    assert memory[CHANGE] == -1.0
+    assert memory[TRANSITION] == -1.0
 
 
 def _inversely_rotated(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ def test_jacobian_during_a_change_matches_finite_differences() -> None:
             point: np.ndarray, elapsed: float = elapsed, ahead: float = ahead
         ) -> tuple[np.ndarray, np.ndarray]:
             memory = _memory(GATE + elapsed)
-            memory[AHEAD] = ahead
+            memory[LEAD] = ahead
             return np.concatenate([point, [1.0, 0.0, 0.0, 0.0]]), memory
 
         jacobian = MAP.jacobian(*arguments_at(p))
@@ -104,15 +104,15 @@ def test_jacobian_during_a_change_matches_finite_differences() -> None:
 def test_gate_is_passed_once_per_lap_also_over_the_seam() -> None:
     changes = packed_changes([ClipChange(0, 1, np.array([0.0, 2.5]), OFFSETS), ClipChange(0, 1, [1.2], OFFSETS)])
     phases = np.arange(0.05, 9.0, 0.03)
-    passed = [(gate_behind(changes, 0.0, 1.0, a % LAP, b % LAP, LAP), b) for a, b in pairwise(phases.tolist())]
+    passed = [(passed_gate(changes, 0.0, 1.0, a % LAP, b % LAP, LAP), b) for a, b in pairwise(phases.tolist())]
     found = [(k, gate) for (k, gate), _ in passed if k >= 0]
     assert found == [(1, 1.2), (0, 2.5), (0, 0.0), (1, 1.2), (0, 2.5), (0, 0.0)]
     for (k, gate), now in passed:
         if k >= 0:
             assert 0.0 <= (now - gate) % LAP < 0.03
     # Not backwards, and not between other rivers.
-    assert gate_behind(changes, 0.0, 1.0, 1.21, 1.19, LAP)[0] == -1
-    assert gate_behind(changes, 1.0, 0.0, 1.19, 1.21, LAP)[0] == -1
+    assert passed_gate(changes, 0.0, 1.0, 1.21, 1.19, LAP)[0] == -1
+    assert passed_gate(changes, 1.0, 0.0, 1.19, 1.21, LAP)[0] == -1
     assert known_between(changes, 0.0, 1.0)
     assert not known_between(changes, 1.0, 0.0)
 
@@ -126,30 +126,30 @@ def test_clip_timed_by_another_river_continues_smoothly_and_catches_up_with_the_
         # The hand is on the level river, below or above the wave whose clip plays.
         x = _stylus(0, t)
         MAP.pose(x, memory)
-        shown.append(memory[SHOWN])
-        if memory[COURSE] == 1.0 and t > 0.7:
-            before = memory[SHOWN]
-            take_course(params, memory, 0.0, x[:3].copy(), before)
-            assert abs(memory[AHEAD]) > 0.005
+        shown.append(memory[CLIP_PHASE])
+        if memory[TIMING_RIVER] == 1.0 and t > 0.7:
+            before = memory[CLIP_PHASE]
+            follow_other_curve(params, memory, 0.0, x[:3].copy(), before)
+            assert abs(memory[LEAD]) > 0.005
             MAP.pose(x, memory)
-            assert memory[SHOWN] == pytest.approx(before, abs=1e-9)
-    assert memory[RIVER] == 1.0
+            assert memory[CLIP_PHASE] == pytest.approx(before, abs=1e-9)
+    assert memory[ACTIVE_RIVER] == 1.0
     assert np.abs(np.diff(shown) - 0.01).max() < 0.006  # the pace of a hand beside the wave
     assert shown[-1] == pytest.approx(times[-1], abs=1e-6)
-    assert memory[AHEAD] == 0.0
+    assert memory[LEAD] == 0.0
 
 
 def test_stopped_clip_has_no_known_change_and_a_stop_ends_a_change() -> None:
     params, memory = MAP.compiled().params, MAP.compiled().memory.copy()
     change_clip(params, memory, 0.0, 0.5)
-    assert knows_change(params, memory, 1.0)
-    assert knows_change(params, memory, 0.0)
+    assert has_transition(params, memory, 1.0)
+    assert has_transition(params, memory, 0.0)
     stop_clip(params, memory, 0.0)
-    assert not knows_change(params, memory, 1.0)
+    assert not has_transition(params, memory, 1.0)
     memory = _memory(GATE)
-    assert not knows_change(params, memory, 0.0)
+    assert not has_transition(params, memory, 0.0)
     stop_clip(params, memory, 0.0)
-    assert memory[CHANGE] == -1.0
+    assert memory[TRANSITION] == -1.0
     assert gate_passed(params, memory, 0.0) == (-1, 0.0)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controllers.curves.cylinder import eased
+from controllers.curves.cylinder import eased_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
@@ -106,13 +106,13 @@ def test_pose_beyond_the_edges_equals_that_at_the_edge():
 
 
 def test_blend_weight_eases_at_the_ends_and_is_linear_between():
-    assert eased(-1.0) == (0.0, 0.0)
-    assert eased(2.0) == (1.0, 0.0)
-    assert eased(0.5)[0] == pytest.approx(0.5)
+    assert eased_weight(-1.0) == (0.0, 0.0)
+    assert eased_weight(2.0) == (1.0, 0.0)
+    assert eased_weight(0.5)[0] == pytest.approx(0.5)
     s = np.linspace(-0.2, 1.2, 1401)
-    weight, slope = np.array([eased(v) for v in s]).T
+    weight, slope = np.array([eased_weight(v) for v in s]).T
     assert (np.diff(weight) >= 0.0).all()
-    numeric = [central_differences(lambda v: eased(v)[0], v, 1e-6) for v in s]
+    numeric = [central_differences(lambda v: eased_weight(v)[0], v, 1e-6) for v in s]
     np.testing.assert_allclose(slope, numeric, atol=1e-5)
     # C²: the slope has no kink either.
     assert np.abs(np.diff(slope, 2)).max() < 1e-3

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, stylus_turn, yielded
+from controllers.haptic_map.expressive import Expressive, ExpressiveJoint, saturate_at_limit, stylus_turn
 from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, displaced, stylus, swinging, wxyz
 from tests.derivatives import extrapolated_differences
 
@@ -108,13 +108,13 @@ def test_pose_is_twice_differentiable_over_every_edge(seed):
 def test_joint_yields_smoothly_to_its_limit_and_never_exceeds_it():
     current, low, high = 0.2, -0.5, 0.9
     requested = np.linspace(-30.0, 30.0, 6001)
-    applied = np.array([yielded(y, current, low, high)[0] for y in requested])
+    applied = np.array([saturate_at_limit(y, current, low, high)[0] for y in requested])
     assert (np.diff(applied) >= 0.0).all()
     assert low < current + applied.min() < low + 0.03
     assert high - 0.03 < current + applied.max() < high
     np.testing.assert_allclose(applied[np.abs(requested) < 0.2], requested[np.abs(requested) < 0.2], rtol=0.02)
     # Where the clip exceeds the limit already, it is neither turned further nor back.
-    assert 0.0 <= yielded(1.0, 1.1, low, high)[0] < 1e-3
+    assert 0.0 <= saturate_at_limit(1.0, 1.1, low, high)[0] < 1e-3
 
 
 def test_half_turn_either_way_gives_no_rotation():

@@ -11,7 +11,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap, KernelMap
 from controllers.haptic_map.map_stages import kernels_of
-from controllers.haptic_map.own_map import own_map
+from controllers.haptic_map.own_map import python_map
 from sim.reference.reference import map_poses
 from tests.controllers.clips_for_maps import assert_same_compiled
 
@@ -185,7 +185,7 @@ def test_concurrent_calls_of_one_map_return_their_own_poses() -> None:
 
     def pose_of(params: np.ndarray, x: np.ndarray, rows: int = 0) -> np.ndarray:
         pose = np.empty(11)
-        own_map(params, x, np.zeros(1), pose, np.empty((rows, 6)))
+        python_map(params, x, np.zeros(1), pose, np.empty((rows, 6)))
         return pose
 
     own = Shared()

@@ -9,15 +9,15 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import (
-    PHASE,
-    RIVER,
+    ACTIVE_RIVER,
+    HAND_PHASE,
     change_clip,
+    has_left_river,
     heading_between,
-    lets_go,
+    is_taken_over,
     phase_rate,
     place_clip,
     stop_clip,
-    takes_over,
 )
 from tests.controllers.clips_for_maps import LEG, difference, matrices, swinging
 from tests.derivatives import central_differences
@@ -85,9 +85,9 @@ def test_clip_begins_in_the_lap_of_the_round_nearest_to_the_hand() -> None:
     params = RiverClips(CURVES, CLIPS, 0.02, [LEG], laps=3).compiled().params
     for last, there, expected in ((0.2, 3.9, 11.9), (6.1, 2.2, 6.2), (11.9, 0.1, 0.1), (9.0, 0.5, 8.5)):
         memory = _memory(0)
-        memory[PHASE] = last
+        memory[HAND_PHASE] = last
         change_clip(params, memory, 1.0, there)
-        assert memory[PHASE] == pytest.approx(expected, abs=1e-12)
+        assert memory[HAND_PHASE] == pytest.approx(expected, abs=1e-12)
 
 
 def test_self_crossing_river_keeps_its_branch_at_the_crossing() -> None:
@@ -133,8 +133,8 @@ def test_clip_is_placed_at_position_and_heading_of_the_figure() -> None:
 def test_only_another_existing_river_takes_over() -> None:
     params = MAP.compiled().params
     memory = _memory(0)
-    assert [takes_over(params, memory, river) for river in (-1.0, 0.0, 1.0, 2.0, np.nan)] == [0, 0, 1, 0, 0]
-    assert memory[RIVER] == 0.0
+    assert [is_taken_over(params, memory, river) for river in (-1.0, 0.0, 1.0, 2.0, np.nan)] == [0, 0, 1, 0, 0]
+    assert memory[ACTIVE_RIVER] == 0.0
 
 
 ON_CURVE = CURVES[0].point(1.0)
@@ -147,7 +147,7 @@ def _lets_go(memory: np.ndarray, position: np.ndarray, rate: float, gain: float,
     The hand moves along the curve at `rate` times its pace and accelerates by `gain` times the pace a second.
     """
     along = CURVES[0].velocity(1.0)
-    return lets_go(MAP.compiled().params, memory, river, np.stack([position, rate * along, gain * along]), rate)
+    return has_left_river(MAP.compiled().params, memory, river, np.stack([position, rate * along, gain * along]), rate)
 
 
 @pytest.mark.parametrize(
@@ -201,9 +201,9 @@ def test_stopped_clip_is_not_let_go_again() -> None:
 
 def test_own_river_takes_over_a_stopped_clip_but_not_a_playing_one() -> None:
     params, memory = MAP.compiled().params, _stopped()
-    assert takes_over(params, memory, 0.0)
+    assert is_taken_over(params, memory, 0.0)
     change_clip(params, memory, 0.0, 3.0)
-    assert not takes_over(params, memory, 0.0)
+    assert not is_taken_over(params, memory, 0.0)
 
 
 def test_clip_stops_at_the_nearest_rest_phase_also_over_the_seam() -> None:
@@ -216,7 +216,7 @@ def test_clip_stops_at_the_nearest_rest_phase_also_over_the_seam() -> None:
     ):  # fmt: skip
         memory = _memory(river, phase)
         stop_clip(params, memory, distance)
-        assert memory[PHASE] == pytest.approx(expected, abs=1e-12)
+        assert memory[HAND_PHASE] == pytest.approx(expected, abs=1e-12)
     # The rest of the map is unchanged.
     x = _stylus(CURVES[0].point(1.0))
     np.testing.assert_array_equal(resting.pose(x), MAP.pose(x))

@@ -6,7 +6,7 @@ import pytest
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT
-from controllers.motion.loops import plane_exponential, turned
+from controllers.motion.loops import plane_exponential, rotate_in_plane
 from tests.controllers.clips_for_maps import LEG
 
 N = 400
@@ -55,7 +55,7 @@ def paths(clips, drifts, weights):
     d = foot_corrections(channels, drifts, LEGS, weights[None])[:, 0, ROOT:].reshape(N, 2, FOOT)
     ends = np.einsum("m,nmk->nk", weights, channels)[:, REST:].reshape(N, 2, 4)
     shift, angle = plane_exponential(S[:, None] * (weights @ drifts))
-    positions = turned(angle[:, None], ends[..., :2] + d[..., :2]) + shift[:, None]
+    positions = rotate_in_plane(angle[:, None], ends[..., :2] + d[..., :2]) + shift[:, None]
     return positions, ends[..., 2] + d[..., 2]
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.lifted import Lifted
-from controllers.legs.footing import fresh_footing, go_on, keep_footing, mixed
+from controllers.legs.footing import advance_hand, fresh_footing, hold_stance_foot, mixing_degree
 from controllers.motion.lap import MEMORY
 from tests.controllers.clips_for_maps import LEG, difference, matrices, numeric_jacobian, stylus, swinging, wxyz
 from tests.controllers.haptic_map.test_lifted_map import ring
@@ -25,7 +25,9 @@ def corrected(path, mixture=1.0, frame=(0.0, 0.0, 0.0), angles=None):
     for (x, y, z, heading, roll), angle in zip(path, angles, strict=True):
         turn = Rotation.from_euler("zx", [heading, roll])
         end, q = np.array([x, y, z - turn.apply(SOLE)[:, 2].min()]), wxyz(turn)
-        keep_footing(footing, 0, go_on(footing, np.mod(angle, TURN)), mixture, SOLE, 0.0, np.array(frame), end, q)
+        hold_stance_foot(
+            footing, 0, advance_hand(footing, np.mod(angle, TURN)), mixture, SOLE, 0.0, np.array(frame), end, q
+        )
         offsets.append(footing[3:6].copy())
         points.append(end + SOLE @ matrices(q).T)
     return np.array(offsets), np.array(points)
@@ -67,9 +69,9 @@ def test_single_clip_and_airborne_foot_are_unchanged():
 
 
 def test_mixed_is_zero_for_one_dominant_weight():
-    assert mixed(np.array([1.0, 0.0, 0.0])) == mixed(np.array([0.99, 0.01])) == 0.0
-    assert mixed(np.array([0.5, 0.5])) == mixed(np.array([0.7, 0.3])) == 1.0
-    assert 0.0 < mixed(np.array([0.9, 0.1])) < 1.0
+    assert mixing_degree(np.array([1.0, 0.0, 0.0])) == mixing_degree(np.array([0.99, 0.01])) == 0.0
+    assert mixing_degree(np.array([0.5, 0.5])) == mixing_degree(np.array([0.7, 0.3])) == 1.0
+    assert 0.0 < mixing_degree(np.array([0.9, 0.1])) < 1.0
 
 
 def test_held_offset_decays_in_the_air_and_is_restored_on_the_way_back():
@@ -88,13 +90,13 @@ def test_held_offset_decays_in_the_air_and_is_restored_on_the_way_back():
 
 def test_progress_follows_the_hands_reversal():
     footing = fresh_footing(1)
-    assert go_on(footing, 1.0) == 0.0
-    assert go_on(footing, 1.1) == pytest.approx(0.1)
-    assert go_on(footing, 1.0) == pytest.approx(-0.1)
-    assert go_on(footing, 0.9) == pytest.approx(-0.1)
-    assert go_on(footing, 0.8) == pytest.approx(0.1)
+    assert advance_hand(footing, 1.0) == 0.0
+    assert advance_hand(footing, 1.1) == pytest.approx(0.1)
+    assert advance_hand(footing, 1.0) == pytest.approx(-0.1)
+    assert advance_hand(footing, 0.9) == pytest.approx(-0.1)
+    assert advance_hand(footing, 0.8) == pytest.approx(0.1)
     # Also over the seam.
-    assert go_on(footing, TURN - 0.1) == pytest.approx(0.9)
+    assert advance_hand(footing, TURN - 0.1) == pytest.approx(0.9)
 
 
 def test_differences_from_one_memory_converge_to_velocity_and_acceleration():
@@ -107,7 +109,7 @@ def test_differences_from_one_memory_converge_to_velocity_and_acceleration():
         x, y, z, heading, roll = requested(t)
         turn = Rotation.from_euler("zx", [heading, roll])
         end, q = np.array([x, y, z - turn.apply(SOLE)[:, 2].min()]), wxyz(turn)
-        keep_footing(footing, 0, go_on(footing, 1.0 + t), 1.0, SOLE, 0.0, np.zeros(3), end, q)
+        hold_stance_foot(footing, 0, advance_hand(footing, 1.0 + t), 1.0, SOLE, 0.0, np.zeros(3), end, q)
         return end
 
     def measured(tick):

@@ -10,7 +10,7 @@ from test_limbs import foot
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.joint_limits import SATURATION_WIDTH, hold_joint, in_the_air
+from controllers.legs.joint_limits import SATURATION_WIDTH, height_weight, saturate_joint
 from tests.controllers.clips_for_maps import LEG, numeric_jacobian, stylus, swinging
 from tests.derivatives import central_differences
 
@@ -26,7 +26,7 @@ def held(vector, rates=None, height=(AIR, 0.0, 0.0)):
     """Rotation of a joint after its limits are applied, and its angular velocities."""
     q = Rotation.from_rotvec(vector).as_quat(scalar_first=True)
     rates = np.zeros((3, 0)) if rates is None else rates.copy()
-    hold_joint(LIMITS, np.array(height), q, rates, rates.shape[1])
+    saturate_joint(LIMITS, np.array(height), q, rates, rates.shape[1])
     assert np.linalg.norm(q) == pytest.approx(1.0, abs=1e-12)
     return Rotation.from_quat(q, scalar_first=True), rates
 
@@ -39,7 +39,7 @@ def test_joint_within_limits_or_near_the_ground_is_unchanged():
         q = -Rotation.from_rotvec(vector).as_quat(scalar_first=True)
         rates = rng.normal(size=(3, 3))
         after, changed = q.copy(), rates.copy()
-        hold_joint(LIMITS, np.array([height, 1.0, 1.0, 1.0]), after, changed, 3)
+        saturate_joint(LIMITS, np.array([height, 1.0, 1.0, 1.0]), after, changed, 3)
         np.testing.assert_array_equal(after, q)
         np.testing.assert_array_equal(changed, rates)
 
@@ -97,7 +97,7 @@ def test_blend_keeps_the_limits_of_its_clips_with_an_exact_jacobian():
         within = (vectors > leg.limits[..., 0] - 0.5 * SATURATION_WIDTH - 1e-9) & (
             vectors < leg.limits[..., 1] + 0.5 * SATURATION_WIDTH + 1e-9
         )
-        assert within.all() or in_the_air(foot(free.pose(x))[0][2])[0] < 1.0
+        assert within.all() or height_weight(foot(free.pose(x))[0][2])[0] < 1.0
         changes += not np.array_equal(pose, free.pose(x))
         jacobian = narrow.jacobian(x)
         error = np.abs(numeric_jacobian(narrow, x, 4e-6) - jacobian[:, :3]).max()

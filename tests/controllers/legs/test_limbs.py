@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.limbs import Limb, flexion, place_limb
+from controllers.legs.limbs import Limb, flexion, solve_limb
 from tests.controllers.clips_for_maps import LEG, difference, numeric_jacobian, stylus, swinging
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
@@ -128,7 +128,7 @@ def test_limb_end_reaches_its_target_as_far_as_the_limb_allows(target, angles):
     orientation = Rotation.from_rotvec([angles[7], angles[8], 0.3])
     rotations[3] = orientation.as_quat(scalar_first=True)
     pose, root, end = np.zeros(19), np.zeros((1, 3)), np.array([target])
-    place_limb(LEG.packed(), rotations, np.empty((4, 3, 0)), root, end, 0)
+    solve_limb(LEG.packed(), rotations, np.empty((4, 3, 0)), root, end, 0)
     pose[3:] = rotations.ravel()
     position, turn = foot(pose)
     np.testing.assert_allclose(np.linalg.norm(rotations, axis=1), 1.0, atol=1e-12)

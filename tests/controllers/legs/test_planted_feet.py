@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.led import Led
-from controllers.legs.planted import levels, planted_ends, window
+from controllers.legs.planted import levels, planted_ends, smooth_mask
 from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
 from experiments.config.modes import Lead
@@ -67,12 +67,12 @@ def skating(name: str) -> Clip:
 def test_windows_are_one_within_runs_of_a_mask() -> None:
     stands = np.zeros(100, dtype=bool)
     stands[80:], stands[:30] = True, True
-    weights = window(stands, 0.1)
+    weights = smooth_mask(stands, 0.1)
     np.testing.assert_array_equal(weights[~stands], 0.0)
     np.testing.assert_array_equal(weights[[*range(86, 100), *range(24)]], 1.0)
     assert 0.0 < weights[80] < weights[82] < 1.0
     assert weights[29] == weights[80]
-    np.testing.assert_array_equal(window(np.ones(5, dtype=bool), 0.1), 1.0)
+    np.testing.assert_array_equal(smooth_mask(np.ones(5, dtype=bool), 0.1), 1.0)
     heights = np.where(stands, 0.02, 0.3)
     np.testing.assert_allclose(levels(heights, stands), 0.02, atol=1e-12)
 
@@ -119,7 +119,7 @@ def test_rolling_sole_lies_flat_between_heel_and_toes(figure) -> None:
     assert np.abs(held - slope).max() < 0.03
     # Two millimetres over the length of a foot.
     assert np.sum(np.abs(held[stands]) < 0.01) > 2.5 * np.sum(np.abs(slope[stands]) < 0.01)
-    swings = window(~stands, 0.35) == 1.0
+    swings = smooth_mask(~stands, 0.35) == 1.0
     np.testing.assert_allclose(held[swings], slope[swings], atol=1e-12)
 
 

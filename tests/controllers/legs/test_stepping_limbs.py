@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from controllers.legs.footsteps import FLOOR, STEP, limb_end
-from controllers.legs.stepping_limbs import put_limb, shortfall
+from controllers.legs.stepping_limbs import required_root_lowering, solve_stepping_limb
 from experiments.fitting.figure_legs import packed_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import pose_difference
@@ -35,7 +35,7 @@ def _end(pose: np.ndarray) -> np.ndarray:
 
 def _put(end: np.ndarray, share: float) -> np.ndarray:
     pose = _pose()
-    put_limb(LEG, pose, end.copy(), share)
+    solve_stepping_limb(LEG, pose, end.copy(), share)
     return pose
 
 
@@ -90,8 +90,8 @@ def test_shortfall_is_the_descent_of_the_root_that_the_leg_needs() -> None:
     line = ankle - hip + [0.3, 0.0, -0.05]
     expected = -line[2] - np.sqrt((0.95 * LENGTH) ** 2 - line[0] ** 2 - line[1] ** 2)
     assert expected > 0.03
-    assert shortfall(LEG, step, pose, end) == pytest.approx(expected, abs=0.01)
+    assert required_root_lowering(LEG, step, pose, end) == pytest.approx(expected, abs=0.01)
     # Neither for a foot in the air nor for one within reach.
     step[FLOOR] = end[2] - 0.3
-    assert shortfall(LEG, step, pose, end) == 0.0
-    assert shortfall(LEG, STANDING, pose, _end(pose)) == 0.0
+    assert required_root_lowering(LEG, step, pose, end) == 0.0
+    assert required_root_lowering(LEG, STANDING, pose, _end(pose)) == 0.0

@@ -6,7 +6,7 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from controllers.motion.captures import Capture, low_passed
+from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
 
 N, DURATION = 256, 1.25
@@ -24,7 +24,7 @@ def waves(frequency: float, size: float) -> np.ndarray:
 def test_each_frequency_is_attenuated_by_the_filter_response(cycles: int) -> None:
     frequency, cutoff = cycles / DURATION, 5.0
     size = 0.01
-    passed = low_passed(waves(frequency, size), DURATION, cutoff)
+    passed = low_pass(waves(frequency, size), DURATION, cutoff)
     share = 1.0 / (1.0 + (frequency / cutoff) ** 4)
     np.testing.assert_allclose(passed[:, 2], share * waves(frequency, size)[:, 2], atol=1e-12)
     bent = Rotation.from_quat(passed[:, 3:], scalar_first=True).as_rotvec()[:, 1]
@@ -39,7 +39,7 @@ def test_low_pass_matches_a_zero_phase_butterworth_filter() -> None:
     laps = np.tile(lap[:, 2], 9)
     sections = signal.butter(2, 5.0, fs=N / DURATION, output="sos")
     twice = signal.sosfiltfilt(sections, laps)[4 * N : 5 * N]
-    np.testing.assert_allclose(low_passed(lap, DURATION, 5.0)[:, 2], twice, atol=2e-4)
+    np.testing.assert_allclose(low_pass(lap, DURATION, 5.0)[:, 2], twice, atol=2e-4)
 
 
 def test_rotation_that_returns_as_its_negative_is_continuous() -> None:
@@ -49,7 +49,7 @@ def test_rotation_that_returns_as_its_negative_is_continuous() -> None:
     turning[turning[:, 3] < 0.0] *= -1.0
     lap = np.concatenate([np.zeros((N, 3)), turning], axis=1)
     assert closing_signs(lap, 1).tolist() == [1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
-    passed = Rotation.from_quat(low_passed(lap, DURATION, 5.0)[:, 3:], scalar_first=True)
+    passed = Rotation.from_quat(low_pass(lap, DURATION, 5.0)[:, 3:], scalar_first=True)
     difference = passed * Rotation.from_quat(turning, scalar_first=True).inv()
     assert difference.magnitude().max() < 1e-6
 

@@ -6,7 +6,14 @@ from scipy.spatial.transform import Rotation
 
 from controllers.blending.alignment import aligned_channels
 from controllers.errors import ParameterError
-from controllers.motion.loops import checked_clip, closed_loop, plane_exponential, there_and_back, turned, yawed
+from controllers.motion.loops import (
+    append_reversal,
+    checked_clip,
+    closed_loop,
+    plane_exponential,
+    rotate_about_vertical,
+    rotate_in_plane,
+)
 from tests.controllers.clips_for_maps import matrices, swinging, wxyz
 
 
@@ -52,7 +59,10 @@ def _curved_walk():
     poses = swinging(5, travel=0.0)
     s = np.linspace(0.0, 1.0, len(poses))
     shift, angle = plane_exponential(s[:, None] * [1.2, 0.1, 0.7])
-    poses[:, :2], poses[:, 3:7] = turned(angle, poses[:, :2]) + shift, yawed(angle, poses[:, 3:7])
+    poses[:, :2], poses[:, 3:7] = (
+        rotate_in_plane(angle, poses[:, :2]) + shift,
+        rotate_about_vertical(angle, poses[:, 3:7]),
+    )
     return poses
 
 
@@ -81,7 +91,7 @@ def test_curved_walk_has_a_periodic_remainder():
 def test_closed_loop_keeps_heading_drift_of_spinning_walk(turns):
     poses = swinging(2, travel=1.3)
     s = np.linspace(0.0, 1.0, len(poses))
-    poses[:, 3:7] = yawed((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
+    poses[:, 3:7] = rotate_about_vertical((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
     loop = _loop(poses)
     assert loop.drift[2] == pytest.approx(-0.24, abs=1e-9)
     channels = loop.channels(s, s)
@@ -96,7 +106,7 @@ def test_loop_with_drift_reconstructs_the_clip():
     s = np.linspace(0.0, 1.0, len(poses))[:-1]
     shift, angle = plane_exponential(s[:, None] * loop.drift)
     channels = loop.channels(s, np.zeros(len(s)))
-    root = turned(angle, channels[:, :2]) + shift
+    root = rotate_in_plane(angle, channels[:, :2]) + shift
     # The same path up to a rigid displacement, and the same joints.
     np.testing.assert_allclose(
         np.linalg.norm(np.diff(root, axis=0), axis=1),
@@ -172,11 +182,11 @@ def test_open_clip_at_rest_is_played_there_and_back():
     poses[:, :3] = [0.0, 0.0, 0.9] + share * [0.3, 0.1, -0.2]
     poses[:, 3] = 1.0
     poses[:, 7:] = np.concatenate([np.cos(0.4 * share), np.sin(0.4 * share), 0.0 * share, 0.0 * share], axis=1)
-    folded = there_and_back(poses, 60.0)
+    folded = append_reversal(poses, 60.0)
     np.testing.assert_allclose(folded[::-1], folded, atol=1e-12)
     np.testing.assert_allclose(folded[[0, len(folded) // 2, -1]], poses[[0, -1, 0]], atol=1e-6)
     loop = closed_loop(folded, 60.0)
     assert np.abs(loop.drift).max() < 1e-9
     # A clip that is closed already, or moves at an end, is unchanged.
     for clip, fps in ((folded, 60.0), (poses[:60], 240.0)):
-        np.testing.assert_array_equal(there_and_back(clip, fps), clip)
+        np.testing.assert_array_equal(append_reversal(clip, fps), clip)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.motion.inertialization import add_offset, offset_left, stopping_way
+from controllers.motion.inertialization import add_offset, decaying_offset, stopping_distance
 
 T = 0.4
 RNG = np.random.default_rng(11)
@@ -15,7 +15,7 @@ def _derivatives(start: np.ndarray, s: float) -> np.ndarray:
     s = min(max(s, 2.0 * h), T - 2.0 * h)
     rows = np.empty((5, start.shape[1]))
     for k in range(5):
-        offset_left(start, T, s + (k - 2) * h, rows[k])
+        decaying_offset(start, T, s + (k - 2) * h, rows[k])
     polynomial = np.polynomial.polynomial.polyfit(np.arange(-2, 3) * h, rows, 4)
     return np.array([polynomial[0], polynomial[1], 2.0 * polynomial[2]])
 
@@ -25,7 +25,7 @@ def test_offset_is_the_quintic_with_given_start_and_zero_end() -> None:
     times = np.linspace(0.0, T, 12)
     rows = np.empty((12, 5))
     for time, row in zip(times, rows, strict=True):
-        offset_left(start, T, time, row)
+        decaying_offset(start, T, time, row)
     # Independent solution: the quintic with these six end conditions, by its linear equations.
     powers = np.arange(6)
     ends = [
@@ -41,16 +41,16 @@ def test_offset_is_the_quintic_with_given_start_and_zero_end() -> None:
 
 def test_offset_ends_without_reversal_after_the_stopping_distance() -> None:
     for speed, acceleration in ((1.3, 0.0), (-0.8, -2.0), (2.0, 4.0)):
-        distance = stopping_way(speed, acceleration, T)
+        distance = stopping_distance(speed, acceleration, T)
         start = np.array([[-distance], [speed], [acceleration]])
         offsets = np.empty((200, 1))
         for time, row in zip(np.linspace(0.0, T, 200), offsets, strict=True):
-            offset_left(start, T, time, row)
+            decaying_offset(start, T, time, row)
         steps = np.diff(offsets[:, 0]) * np.sign(speed)
         assert steps.min() > -1e-12
         # Without the stopping distance the figure would have to come back.
         for time, row in zip(np.linspace(0.0, T, 200), offsets, strict=True):
-            offset_left(start * [[0.0], [1.0], [1.0]], T, time, row)
+            decaying_offset(start * [[0.0], [1.0], [1.0]], T, time, row)
         assert (np.diff(offsets[:, 0]) * np.sign(speed)).min() < -1e-4
 
 

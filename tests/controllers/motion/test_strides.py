@@ -5,7 +5,7 @@ import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import in_step, natural_lap, strides
+from controllers.motion.strides import fit_to_lap, natural_lap, strides
 from tests.controllers.clips_for_maps import difference, stylus, swinging
 
 
@@ -36,7 +36,7 @@ def test_still_clip_repeats_once():
 def test_travelling_clips_take_as_many_strides_as_the_first():
     still, walk, run, step = swinging(4), repeated(1, 2, 1.1), repeated(2, 3, 2.0), swinging(3, travel=0.4)
     loops = [loop(poses) for poses in (still, walk, run, step)]
-    adjusted = in_step(loops)
+    adjusted = fit_to_lap(loops)
     np.testing.assert_allclose([np.hypot(*one.drift[:2]) for one in adjusted], [0.0, 2.2, 4.0, 0.4], atol=1e-9)
     np.testing.assert_allclose([one.duration for one in adjusted], [4.0, 4.0, 4.0, 4.0], atol=1e-9)
     s = np.linspace(0.0, 1.0, 50)
@@ -62,7 +62,7 @@ def test_lap_of_given_duration_plays_each_clip_a_fitting_number_of_times():
     # 2 s in place, a walk of two strides in 4 s, a run of three in 6 s.
     loops = [loop(poses) for poses in (swinging(4, 60), repeated(1, 2, 1.1), repeated(2, 3, 2.0))]
     durations = np.array([one.duration for one in loops])
-    adjusted = in_step(loops, 6.0)
+    adjusted = fit_to_lap(loops, 6.0)
     assert adjusted[0].share == 3.0
     # Travelling clips have the same number of strides, here three: 1.5 times the walk and once the run.
     strides_a_lap = [adjusted[1].share * 2, adjusted[2].share * 3]
@@ -75,9 +75,9 @@ def test_lap_of_given_duration_plays_each_clip_a_fitting_number_of_times():
 def test_clips_not_in_step_keep_nearly_their_own_pace():
     # Cycles of 2 and 0.9 s: two and four of them; in step their numbers are equal.
     loops = [loop(repeated(1, 2, 1.1)), loop(repeated(2, 3, 2.0, 27))]
-    durations = [one.duration for one in in_step(loops, 4.1, apart=True)]
+    durations = [one.duration for one in fit_to_lap(loops, 4.1, apart=True)]
     np.testing.assert_allclose(durations, [4.0, 3.6])
-    np.testing.assert_allclose([one.duration for one in in_step(loops, 4.1)], [4.0, 1.8])
+    np.testing.assert_allclose([one.duration for one in fit_to_lap(loops, 4.1)], [4.0, 1.8])
 
 
 def test_natural_lap_plays_the_first_clip_at_its_own_pace():
@@ -86,13 +86,13 @@ def test_natural_lap_plays_the_first_clip_at_its_own_pace():
     for first in range(3):
         order = loops[first:] + loops[:first]
         lap = natural_lap(order)
-        assert in_step(order[:1], lap)[0].duration == pytest.approx(lap)
+        assert fit_to_lap(order[:1], lap)[0].duration == pytest.approx(lap)
         assert 3.0 <= lap <= 6.0
 
 
 def test_natural_lap_plays_all_clips_near_their_own_pace_if_possible():
     loops = [loop(swinging(seed, frames)) for seed, frames in ((4, 30), (5, 45), (6, 90))]
     lap = natural_lap(loops)
-    paces = [one.duration / lap for one in in_step(loops, lap)]
+    paces = [one.duration / lap for one in fit_to_lap(loops, lap)]
     np.testing.assert_allclose(paces, 1.0, atol=0.05)
     assert 3.0 <= lap <= 6.0

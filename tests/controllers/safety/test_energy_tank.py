@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
-from controllers.safety.energy_tank import TANK_ENERGY, TANK_SCALE, EnergyTank, guard_energy, river_power, spring_store
+from controllers.safety.energy_tank import TANK_ENERGY, TANK_SCALE, EnergyTank, limit_power, river_power, spring_store
 
 TANK = EnergyTank(1e-3, power=0.02, capacity=0.05)
 
@@ -16,7 +16,7 @@ def _push_a_mass(tank, law, seconds, mass=0.1):
     injected, speeds = [0.0], []
     for _ in range(round(seconds / period)):
         force[:] = law(p, v)
-        guard_energy(params, memory, p, v, force)
+        limit_power(params, memory, p, v, force)
         step = v * period + 0.5 * force / mass * period**2
         injected.append(injected[-1] + force @ step)
         p, v = p + step, v + force / mass * period
@@ -41,7 +41,7 @@ def test_dissipating_force_is_unchanged():
     memory[TANK_ENERGY] = 0.0
     for v in ([-0.3, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.5, 0.0]):
         force = np.array([2.0, 0.0, 0.0])
-        guard_energy(TANK.params(), memory, np.zeros(3), np.array(v), force)
+        limit_power(TANK.params(), memory, np.zeros(3), np.array(v), force)
         assert force.tolist() == [2.0, 0.0, 0.0]
 
 
@@ -51,13 +51,13 @@ def test_overdrawn_tank_scales_the_force_down_and_refills():
         memory = TANK.fresh_memory()
         memory[TANK_ENERGY] = energy
         force = np.array([2.0, 0.0, 0.0])
-        guard_energy(TANK.params(), memory, np.zeros(3), np.array([-0.3, 0.0, 0.0]), force)
+        limit_power(TANK.params(), memory, np.zeros(3), np.array([-0.3, 0.0, 0.0]), force)
         assert force[0] == pytest.approx(2.0 * share, abs=1e-8)
         assert memory[TANK_SCALE] == pytest.approx(share, abs=1e-8)
     memory = TANK.fresh_memory()
     memory[TANK_ENERGY] = -0.001
     for _ in range(26):
-        guard_energy(TANK.params(), memory, np.zeros(3), np.zeros(3), np.zeros(3))
+        limit_power(TANK.params(), memory, np.zeros(3), np.zeros(3), np.zeros(3))
     assert memory[TANK_ENERGY] == pytest.approx(-0.0005, rel=1e-9)
 
 
@@ -65,18 +65,18 @@ def test_vanishing_speed_leaves_the_force_unchanged():
     memory = TANK.fresh_memory()
     for speed in (1e-300, 1e-12, 1e-3):
         force = np.array([3.0, 0.0, 0.0])
-        guard_energy(TANK.params(), memory, np.zeros(3), np.array([speed, 0.0, 0.0]), force)
+        limit_power(TANK.params(), memory, np.zeros(3), np.array([speed, 0.0, 0.0]), force)
         assert force[0] == 3.0
 
 
 def test_stored_energy_changes_by_flows_only():
     memory, p, v = TANK.fresh_memory(), np.zeros(3), np.array([0.1, 0.0, 0.0])
     force = np.array([0.5, 0.0, 0.0])
-    guard_energy(TANK.params(), memory, p, v, force)
+    limit_power(TANK.params(), memory, p, v, force)
     assert memory[TANK_ENERGY] == 0.05
-    guard_energy(TANK.params(), memory, p + 0.002, v, force)
+    limit_power(TANK.params(), memory, p + 0.002, v, force)
     assert memory[TANK_ENERGY] == pytest.approx(0.05 - 0.5 * 0.002 + 0.02e-3, rel=1e-12)
-    guard_energy(TANK.params(), memory, p - 0.5, v, np.zeros(3))
+    limit_power(TANK.params(), memory, p - 0.5, v, np.zeros(3))
     assert memory[TANK_ENERGY] == 0.05
 
 
@@ -86,7 +86,7 @@ def test_empty_tank_passes_its_power_continuously():
     powers = []
     for speed in np.linspace(0.009, 0.011, 5):
         force = np.array([2.0, 0.0, 0.0])
-        guard_energy(TANK.params(), memory.copy(), np.zeros(3), np.array([speed, 0.0, 0.0]), force)
+        limit_power(TANK.params(), memory.copy(), np.zeros(3), np.array([speed, 0.0, 0.0]), force)
         powers.append(force[0] * speed)
     np.testing.assert_allclose(powers, [0.018, 0.019, 0.02, 0.02, 0.02], rtol=1e-12)
 

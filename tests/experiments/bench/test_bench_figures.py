@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from experiments.bench.figures import Figure, print_figures
+from experiments.bench.figures import BenchmarkResult, print_figures
 from experiments.bench.tick_cost import MODES
 
 FIGURES = (
-    Figure("a tick", 1.4, "mj_steps", at_most=1.5),
-    Figure("threads", 0.8, at_least=0.9),
-    Figure("told", 3.0),
+    BenchmarkResult("a tick", 1.4, "mj_steps", at_most=1.5),
+    BenchmarkResult("threads", 0.8, at_least=0.9),
+    BenchmarkResult("told", 3.0),
 )
 
 
@@ -29,8 +29,8 @@ def test_check_prints_verdicts_and_fails_if_any_figure_fails(
 
 
 def test_nan_fails_upper_and_lower_bounds() -> None:
-    assert Figure("nothing", float("nan"), at_most=1.0).passes is False
-    assert Figure("nothing", float("nan"), at_least=1.0).passes is False
+    assert BenchmarkResult("nothing", float("nan"), at_most=1.0).passes is False
+    assert BenchmarkResult("nothing", float("nan"), at_least=1.0).passes is False
 
 
 def test_json_output_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:

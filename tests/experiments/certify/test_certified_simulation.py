@@ -5,7 +5,7 @@ import pytest
 
 import hvf
 from controllers.certificates.loop.hand import NO_HANDS
-from controllers.certificates.report import Verdict, leaving_out
+from controllers.certificates.report import Verdict, without_laws
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
@@ -44,8 +44,8 @@ def test_uncovered_law_is_unknown_and_named():
     assert "StretchyTubes" in found.reason
     assert "no oscillation grows at" in found.reason
     certified = Verdict("certified", "stable", 1.0)
-    assert leaving_out(certified, ["walls", "gates"]).reason == "left out: walls and gates; without: stable"
-    assert leaving_out(Verdict("refuted", "no", None, (), {"p": 1}), ["walls"]).verdict == "refuted"
+    assert without_laws(certified, ["walls", "gates"]).reason == "left out: walls and gates; without: stable"
+    assert without_laws(Verdict("refuted", "no", None, (), {"p": 1}), ["walls"]).verdict == "refuted"
 
 
 CURVE = hvf.circle(lap=2.0)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from controllers.certificates.flight.tolerance import JUDGING
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from experiments.certify import certified_field
@@ -26,7 +26,7 @@ from experiments.cli import main
 from experiments.config.words import run_config
 from experiments.files import certificate_files
 from experiments.files.certificate_files import read_certificate, verify_certificate
-from experiments.setups.certified_law import left_out
+from experiments.setups.certified_law import uncertified_parts
 from models.mocap.library import embedded
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -161,7 +161,7 @@ def test_certified_laws_of_bunny_and_tubes_and_uncovered_gates():
         ("", 140.0, True), ("_held", 160.0, False), ("_then", 300.0, True),
     ]  # fmt: skip
     assert certified_rivers(run_config(mode="rivers"))[""].width == run_config(mode="rivers").mode.river_tube
-    assert left_out(run_config(mode="rivers", governor=True)) == ("the gates of the rivers (--governor)",)
+    assert uncertified_parts(run_config(mode="rivers", governor=True)) == ("the gates of the rivers (--governor)",)
 
 
 @pytest.mark.parametrize("text", ['{"inputs": "0"}', "[1, 2", "\x00", "[" * 100_000])
@@ -214,7 +214,7 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
 @pytest.mark.parametrize("rig", [Rig(), Rig(leading=1), Rig(without=("head", "neck"), leading=1)])
 def test_capture_certificate_lists_scaling_and_dropped_first_frame(rig, tmp_path):
     write_rig(rig, embedded("walk"), tmp_path / "walker.bvh")
-    certificate = certify_clip_into(str(tmp_path / "walker.bvh"), tmp_path / "out", JUDGING)
+    certificate = certify_clip_into(str(tmp_path / "walker.bvh"), tmp_path / "out", DEFAULT_CRITERIA)
     assumed = certificate.verdicts["ballistic"].assumptions
     (scaled,) = (
         line for line in assumed if line.startswith("lengths, and gravity with them, are scaled to the figure:")

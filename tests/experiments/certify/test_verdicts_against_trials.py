@@ -21,12 +21,12 @@ from controllers.fields.governor import Governor
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import LAP, Conditions, Trial, simulate
+from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial, simulate
 from experiments.cli import main
 from models.mocap.library import embedded
 
 CIRCLE = Trajectory.circle(0.0477, 4.0)
-TRIAL_CURVE = Trajectory.circle(0.0477, LAP)
+TRIAL_CURVE = Trajectory.circle(0.0477, LAP_DURATION)
 DEVICE = phantom_device()
 
 
@@ -120,8 +120,8 @@ def test_trials_oscillate_exactly_where_refuted(name):
     rng, oscillating = np.random.default_rng(20), 0
     for _ in range(20):
         # A refutation is for the phase of its counterexample, a certificate for every phase.
-        phase, across = rng.uniform(0.0, LAP), np.array([0.0, 0.0, 1.0])
-        phase = float(example["phase"]) * LAP / 4.0 if example else phase
+        phase, across = rng.uniform(0.0, LAP_DURATION), np.array([0.0, 0.0, 1.0])
+        phase = float(example["phase"]) * LAP_DURATION / 4.0 if example else phase
         trial = LawTrial(TRIAL_CURVE, phase, 8.0, Sampling(1e-3), HandImpedance(), across, law)
         loop = trial.loop()
         inverse, state = np.linalg.inv(loop.linear.jacobian[0]), np.zeros(12)

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.config.keywords import in_options, keywords
+from experiments.config.keywords import option_message, to_keywords
 from experiments.config.modes import Rivers, SpeedGovernor
 from experiments.config.part import from_dict, to_dict, to_json
 from experiments.config.run_config import FIGURE_DEFAULTS, Figure, RunConfig
-from experiments.config.words import RunOptions, changed, config_of_options, run_config
+from experiments.config.words import RunOptions, config_of_options, run_config, with_options
 from experiments.hardware.parts import served
 
 
@@ -26,10 +26,10 @@ from experiments.hardware.parts import served
     ],
 )  # fmt: skip
 def test_figure_number_inapplicable_to_its_kind_is_refused(numbers: dict[str, Any], message: str) -> None:
-    with pytest.raises(ParameterError, match=f"^{keywords(message, figure='kind')}$") as error:
+    with pytest.raises(ParameterError, match=f"^{to_keywords(message, figure='kind')}$") as error:
         Figure(**numbers)
-    assert in_options(error.value) == message
-    with pytest.raises(ParameterError, match=f"^a file: {keywords(message)}$"):
+    assert option_message(error.value) == message
+    with pytest.raises(ParameterError, match=f"^a file: {to_keywords(message)}$"):
         from_dict(RunConfig, to_dict(RunConfig()) | {"figure": numbers}, "a file")
 
 
@@ -77,12 +77,12 @@ def test_governor_drag_of_gated_rivers_is_refused(drag: float) -> None:
         Rivers(governor=SpeedGovernor(governor_drag=30.0))
     summed = run_config("rivers", governor=True, governor_drag=drag, crossing="sum")
     assert summed.mode == Rivers(crossing="sum", governor=SpeedGovernor(governor_drag=drag))
-    assert changed(summed, {"crossing": "discrete"}).mode == Rivers(governor=SpeedGovernor())
+    assert with_options(summed, {"crossing": "discrete"}).mode == Rivers(governor=SpeedGovernor())
 
 
 def test_changed_figure_kind_resets_inapplicable_numbers() -> None:
     config = run_config(residual_force=0.2, blend=0.3, stature=1.2, mass=30.0, figure_ticks=5)
-    assert changed(config, {"figure": "kinematic"}).figure == Figure(
+    assert with_options(config, {"figure": "kinematic"}).figure == Figure(
         kind="kinematic", blend=0.3, stature=1.2, figure_ticks=5
     )
-    assert changed(config, {"figure": "none"}).figure == Figure(kind="none")
+    assert with_options(config, {"figure": "none"}).figure == Figure(kind="none")

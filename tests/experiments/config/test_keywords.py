@@ -12,7 +12,7 @@ import pytest
 import hvf
 from controllers.errors import ParameterError
 from experiments.cli import main
-from experiments.config.keywords import in_keywords, in_options, keywords
+from experiments.config.keywords import option_message, to_keywords, with_keyword_messages
 from experiments.config.words import run_config
 
 CURVE = hvf.circle()
@@ -39,11 +39,11 @@ SIM = hvf.Simulation(
     ],
 )
 def test_option_in_message_becomes_keyword(text: str, message: str) -> None:
-    assert keywords(text, out="record") == message
+    assert to_keywords(text, out="record") == message
 
 
 def test_error_type_and_traceback_are_preserved() -> None:
-    @in_keywords()
+    @with_keyword_messages()
     def fails() -> None:
         raise ParameterError("--lap is 0; expected more")
 
@@ -53,14 +53,14 @@ def test_error_type_and_traceback_are_preserved() -> None:
 
 
 def test_nested_conversion_to_options_restores_the_message() -> None:
-    @in_keywords()
+    @with_keyword_messages()
     def fails() -> None:
         raise ParameterError("--lap is 0 with --figure none")
 
     with pytest.raises(ParameterError, match=r'^lap is 0 with figure="none"$') as raised:
-        in_keywords(figure="kind")(fails)()
-    assert in_options(raised.value) == "--lap is 0 with --figure none"
-    assert in_options(ParameterError("--lap is 0")) == "--lap is 0"
+        with_keyword_messages(figure="kind")(fails)()
+    assert option_message(raised.value) == "--lap is 0 with --figure none"
+    assert option_message(ParameterError("--lap is 0")) == "--lap is 0"
 
 
 SPACE, CERTIFIED = {"field.k_r": (50.0, 90.0)}, SimpleNamespace(verdict="certified")

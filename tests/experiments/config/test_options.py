@@ -9,8 +9,8 @@ from typing import Any, get_args, get_type_hints
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.cli import main, parsed
-from experiments.config.keywords import in_options
+from experiments.cli import main, parse_command
+from experiments.config.keywords import option_message
 from experiments.config.maps import MAPS, Circle, Composite, Cylindrical, Led, MapFile, RiverClips, RobotArm
 from experiments.config.modes import (
     MODES,
@@ -24,7 +24,7 @@ from experiments.config.modes import (
     Stretch,
     StretchThenFollow,
 )
-from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole
+from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole_number
 from experiments.config.run_config import (
     Clock,
     Figure,
@@ -34,7 +34,15 @@ from experiments.config.run_config import (
     User,
     load_config,
 )
-from experiments.config.words import ADDED, VOCABULARY, RunOptions, changed, config_of_options, run_config, words_of
+from experiments.config.words import (
+    OPTIONAL_PARTS,
+    VOCABULARY,
+    RunOptions,
+    config_of_options,
+    options_of,
+    run_config,
+    with_options,
+)
 from experiments.hardware.parts import served, session_of
 from experiments.setups.wiring import wire
 from sim.errors import SimError
@@ -42,7 +50,7 @@ from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.person.person import Person
 from sim.users.person.population import persona
 
-PARTS = (*MODES, *ADDED.values(), *MAPS, Led, Circle, User, Figure, Phantom, Replay, Clock, RunConfig)
+PARTS = (*MODES, *OPTIONAL_PARTS.values(), *MAPS, Led, Circle, User, Figure, Phantom, Replay, Clock, RunConfig)
 NEEDED: dict[type, dict[str, object]] = {MapFile: {"file": "map.npz"}, Replay: {"run": "runs/mine"}}
 PUSHES = (Push(0.5, 0.3, -2.0), Push(1.0, 0.2, 1.0, (0.0, 0.0, 1.0), (0.05, 0.0, 0.0)))
 TURNS, GRABS = (Turn(0.0, 1.0, 0.5, (0.0, 0.0, 1.0)),), (Grab(1.0, (0.0, 0.01, 0.0), place=(0.05, 0.0, 0.0)),)
@@ -82,7 +90,7 @@ class Inner:
 class Outer:
     wide_gap: float | None = at_least(0.5, default=None, unit="s")
     reach: float = at_least(1.0, default=2.0, infinite=True)
-    count: int = whole(2, default=2)
+    count: int = whole_number(2, default=2)
     name: str = "any"
     inner: Inner = Inner()
 
@@ -120,7 +128,7 @@ def test_number_outside_its_interval_is_refused_by_name(cls: type, name: str) ->
     for value in wrong:
         with pytest.raises(ParameterError, match=rf"^{name} is {value:g}; expected ") as error:
             make_part(cls, **{name: value})
-        assert in_options(error.value).startswith(f"{flag} is {value:g}; expected ")
+        assert option_message(error.value).startswith(f"{flag} is {value:g}; expected ")
     if limits.get("allow_inf_nan"):
         assert getattr(make_part(cls, **{name: inf}), name) == inf
     if "ge" in limits:
@@ -236,11 +244,11 @@ def _configs_of_all_kinds() -> list[RunConfig]:
 
 @pytest.mark.parametrize("config", _configs_of_all_kinds(), ids=lambda config: f"{config.mode.kind} {config.map.kind}")
 def test_configuration_round_trips_through_words_and_json(config: RunConfig) -> None:
-    assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
+    assert run_config(**options_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_json(RunConfig, to_json(config), "config.json") == config
     assert from_dict(RunConfig, to_dict(config), "a recording") == config
     assert from_dict(RunConfig, json.loads(json.dumps(to_dict(config))), "a recording") == config
-    assert changed(config, {}) == config
+    assert with_options(config, {}) == config
 
 
 def test_round_trip_cases_cover_every_mode_and_map() -> None:
@@ -367,7 +375,7 @@ def test_lead_without_figure_is_refused_in_a_run_and_allowed_on_a_device() -> No
 def test_configuration_of_every_mode_round_trips_through_its_file(mode: str, tmp_path: Path) -> None:
     from experiments.config.part import to_json
 
-    config = config_of_options(parsed(["run", "--mode", mode, "--seconds", "3"]).options)
+    config = config_of_options(parse_command(["run", "--mode", mode, "--seconds", "3"]).options)
     file = tmp_path / "config.json"
     file.write_text(to_json(config))
-    assert config_of_options(parsed(["run", "--config", str(file)]).options) == config == load_config(file)
+    assert config_of_options(parse_command(["run", "--config", str(file)]).options) == config == load_config(file)

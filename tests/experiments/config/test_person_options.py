@@ -10,7 +10,7 @@ from controllers.errors import ParameterError
 from experiments.cli import main
 from experiments.config.part import from_json, to_json
 from experiments.config.run_config import RunConfig
-from experiments.config.words import changed, run_config, words_of
+from experiments.config.words import options_of, run_config, with_options
 from experiments.setups.parts.hands import intent_of
 from experiments.studies.user_laws.report import lines, user_laws
 from sim.errors import SimError
@@ -23,13 +23,13 @@ def test_named_person_is_written_out_in_the_file() -> None:
     config = run_config(person="novice", user="trace")
     assert config.user.person == hvf.persona("novice")
     assert from_json(RunConfig, to_json(config), "here") == config
-    assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
+    assert run_config(**options_of(config)) == config  # pyright: ignore[reportArgumentType]
 
 
 def test_changed_configuration_keeps_or_replaces_the_person() -> None:
     config = run_config(person="7:2")
-    assert changed(config, {"seconds": 3.0}).user.person == population(3, 7)[2]
-    assert changed(config, {"person": "elder"}).user.person == hvf.persona("elder")
+    assert with_options(config, {"seconds": 3.0}).user.person == population(3, 7)[2]
+    assert with_options(config, {"person": "elder"}).user.person == hvf.persona("elder")
 
 
 def test_default_user_has_no_person() -> None:

@@ -12,7 +12,7 @@ from experiments.config.maps import Cylindrical
 from experiments.config.part import from_dict, from_json
 from experiments.config.run_config import Figure, RunConfig
 from experiments.config.words import run_config
-from experiments.trials.design.study_config import Users, study_from
+from experiments.trials.design.study_config import Users, parse_study
 from experiments.trials.execution.where import Where
 from experiments.tuning.tune_config import Range, TuneConfig
 from tests.experiments.config.test_options import NEEDED, PARTS
@@ -74,7 +74,7 @@ def test_integers_in_a_file_are_accepted_as_floats() -> None:
 def test_non_numeric_study_and_tuning_values_are_refused() -> None:
     for values in ({"repetitions": True}, {"seconds": "8"}, {"users": {"number": True}}):
         with pytest.raises(ParameterError, match=r"expected a number$"):
-            study_from({"name": "mine", "factors": {"stiffness": [100, 300]}} | values, "my.toml")
+            parse_study({"name": "mine", "factors": {"stiffness": [100, 300]}} | values, "my.toml")
     for bounds in ({"low": True, "high": 2}, {"low": 1, "high": "2"}):
         with pytest.raises(ParameterError, match=r"^my\.toml: space\.stiffness\..* expected a number$"):
             from_dict(TuneConfig, {"name": "mine", "space": {"stiffness": bounds}}, "my.toml")

@@ -11,9 +11,9 @@ def test_long_run_is_announced_with_time_and_disk_space(tmp_path: Path, monkeypa
 
     monkeypatch.setattr(estimates, "expected_seconds", lambda what: 0.25)
     groups = {"ticks": Group(1000.0, {"x": (100,)})}
-    announcement = estimates.foreseen(tmp_path, 86400.0 / 24, groups)
+    announcement = estimates.cost_estimate(tmp_path, 86400.0 / 24, groups)
     assert announcement is not None
     assert announcement.startswith(
         "3600 s of simulated time take about 15 minutes at the pace of the last run, and 2.88 GB of"
     )
-    assert estimates.foreseen(tmp_path, 10.0, groups) is None
+    assert estimates.cost_estimate(tmp_path, 10.0, groups) is None

@@ -3,13 +3,13 @@
 import time
 from pathlib import Path
 
-from experiments.console.progress import left, working
+from experiments.console.progress import remaining_text, working
 
 
 def test_time_left_is_stored_duration_minus_elapsed_time() -> None:
-    assert left(12.0, 30.0) == "12 s, about 18 s left"
-    assert left(12.4, None) == "12 s"
-    assert "longer" in left(31.0, 30.0)
+    assert remaining_text(12.0, 30.0) == "12 s, about 18 s left"
+    assert remaining_text(12.4, None) == "12 s"
+    assert "longer" in remaining_text(31.0, 30.0)
 
 
 def test_command_durations_are_stored_and_a_corrupt_file_is_ignored(tmp_path: Path, monkeypatch) -> None:

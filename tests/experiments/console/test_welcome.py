@@ -1,6 +1,6 @@
 """What `hvf` without arguments prints."""
 
-from experiments.cli import WELCOME, main, parsed
+from experiments.cli import WELCOME, main, parse_command
 
 
 def test_welcome_text_names_only_existing_commands(capsys) -> None:
@@ -9,4 +9,4 @@ def test_welcome_text_names_only_existing_commands(capsys) -> None:
     assert stdout == WELCOME + "\n"
     for line in stdout.splitlines():
         if line.startswith("  hvf "):
-            assert callable(parsed(line.strip().split("  ")[0].split()[1:])), line
+            assert callable(parse_command(line.strip().split("  ")[0].split()[1:])), line

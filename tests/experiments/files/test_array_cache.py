@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from experiments.files.array_cache import kept_array
+from experiments.files.array_cache import cached_array
 
 SHAPE = (4, 3, 2)
 VALUES = np.random.default_rng(0).normal(size=SHAPE)
@@ -14,7 +14,7 @@ INPUTS = (np.arange(5.0), np.array([2], dtype=np.uint8))
 
 @pytest.fixture
 def cached(tmp_path):
-    """Calls `kept_array` and counts how often the array was computed."""
+    """Calls `cached_array` and counts how often the array was computed."""
 
     class Keeper:
         folder, found = tmp_path / "cache", 0
@@ -24,7 +24,7 @@ def cached(tmp_path):
                 self.found += 1
                 return values
 
-            return kept_array(self.folder, "sway", made_of, SHAPE, find)
+            return cached_array(self.folder, "sway", made_of, SHAPE, find)
 
         @property
         def files(self):
@@ -58,7 +58,7 @@ def test_corrupted_cache_file_is_recomputed(cached):
 
 def test_unspecified_row_count_accepts_only_whole_rows(tmp_path):
     def cached(values, shape):
-        return kept_array(tmp_path, "table", INPUTS, shape, lambda: values)
+        return cached_array(tmp_path, "table", INPUTS, shape, lambda: values)
 
     np.testing.assert_array_equal(cached(VALUES, (-1, *SHAPE[1:])), VALUES)
     np.testing.assert_array_equal(cached(2.0 * VALUES, (-1, *SHAPE[1:])), VALUES)

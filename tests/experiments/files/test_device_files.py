@@ -9,9 +9,9 @@ import pytest
 from experiments.files.device_files import calibrated_json, identified_json, read_device_file, save_device
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
-from sim.hardware.identification import NAMES, Identified
+from sim.hardware.identification import NAMES, IdentificationResult
 
-FOUND = Identified(np.full(len(NAMES), -1e-6), np.full(len(NAMES), np.inf), 1000, 0.001)
+FOUND = IdentificationResult(np.full(len(NAMES), -1e-6), np.full(len(NAMES), np.inf), 1000, 0.001)
 ARM = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=False)
 
 

@@ -11,14 +11,14 @@ from experiments.cli import main
 from experiments.files import whole_file as whole
 from experiments.files.device_files import save_device
 from experiments.files.map_files import write_arrays
-from experiments.files.whole_file import whole_file
+from experiments.files.whole_file import atomic_file
 from experiments.lifting import lift_file
 
 
 def test_file_appears_only_once_closed(tmp_path: Path) -> None:
     path = tmp_path / "map.npz"
     path.write_bytes(b"old")
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(b"new")
         assert path.read_bytes() == b"old"
     assert path.read_bytes() == b"new"
@@ -40,7 +40,7 @@ def test_symbolic_link_is_preserved(tmp_path: Path) -> None:
 
 
 def _interrupted(path: Path, what: Any) -> None:
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(b"half")
         raise what
 

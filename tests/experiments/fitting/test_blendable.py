@@ -9,10 +9,10 @@ import pytest
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import in_step, natural_lap
+from controllers.motion.strides import fit_to_lap, natural_lap
 from experiments.config.words import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import grounded, keeps_pace, not_blendable, off_pace
+from experiments.fitting.blendable import keeps_pace, not_blendable, off_pace, timing_clip
 from experiments.setups.parts.governor import speeds_along
 from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
@@ -41,7 +41,7 @@ def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
 
 def test_lap_is_timed_by_the_first_grounded_clip() -> None:
     run, walk, cheer = embedded("run"), embedded("walk"), embedded("cheer")
-    assert [grounded(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
+    assert [timing_clip(clips) for clips in ((walk, run), (run, walk, cheer), (run, run))] == [0, 1, 0]
     # At this lap the cheer is off its pace, so only arms are blended, and each clip keeps its own pace.
     parts = map_parts(run_config(clips=("run", "walk", "cheer"), lap=2.2, seconds=1.0), figure_model())
     assert parts.haptic_map.legs_of == 1
@@ -84,8 +84,10 @@ def test_current_lap_is_not_advised() -> None:
     clips = embedded("angry"), embedded("jump")
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
     lap = natural_lap(loops)
-    assert off_pace(clips, in_step(loops, 1.1 * lap), 1.1 * lap, 1, 0)[0].endswith(f"; --lap {lap:.1f} suits them best")
-    assert off_pace(clips, in_step(loops, lap), lap, 1, 0)[0].endswith("; no lap suits them all better")
+    assert off_pace(clips, fit_to_lap(loops, 1.1 * lap), 1.1 * lap, 1, 0)[0].endswith(
+        f"; --lap {lap:.1f} suits them best"
+    )
+    assert off_pace(clips, fit_to_lap(loops, lap), lap, 1, 0)[0].endswith("; no lap suits them all better")
 
 
 def test_run_gets_one_lap_advice() -> None:

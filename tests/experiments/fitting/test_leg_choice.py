@@ -6,7 +6,7 @@ import pytest
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.fitting import leg_choice as rule
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.leg_choice import carried, sound, toured, verdict_on
+from experiments.fitting.leg_choice import animation_is_sound, select_legs, tour_animation, verdict_on
 from experiments.fitting.similarity import arms
 from experiments.fitting.verdict import Verdict
 from models.humanoid.skeleton import figure_model
@@ -35,14 +35,14 @@ def set_verdicts(
         return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
 
     monkeypatch.setattr(rule, "verdict_on", verdict)
-    monkeypatch.setattr(rule, "sound", lambda haptic_map, lap, parallel: haptic_map.legs_of in fit)
+    monkeypatch.setattr(rule, "animation_is_sound", lambda haptic_map, lap, parallel: haptic_map.legs_of in fit)
     return trials
 
 
 def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, NEVER), (3, 1.0): Verdict(0.01, NEVER)}
     trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (1, 1.0, ())
     assert trials == [(0, 1.0), (1, 1.0)]
 
@@ -52,7 +52,7 @@ def test_legs_with_least_residual_are_chosen_if_none_bear_well(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, NEVER), (3, 1.0): Verdict(0.08, NEVER)}
     trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
-    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (3, 1.0, ())
     assert trials == [(owner, 1.0) for owner in range(4)]
 
@@ -61,7 +61,7 @@ def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     set_verdicts(monkeypatch, {(1, 1.0): Verdict(0.2, NEVER), (2, 0.25): Verdict(0.08, NEVER)}, {0, 1, 2, 3})
-    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (2, 0.25, ())
 
 
@@ -70,20 +70,20 @@ def test_sliding_legs_are_chosen_only_as_a_last_resort(
 ) -> None:
     verdicts = {(0, 1.0): Verdict(0.01, NEVER), (1, 0.0): Verdict(0.06, NEVER)}
     set_verdicts(monkeypatch, verdicts, {1, 2, 3})
-    assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 1
+    assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 1
     set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.01, NEVER)}, {1, 2, 3})
-    assert carried(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
+    assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
 def test_unbearable_map_is_reported_with_the_best_legs(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     set_verdicts(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
-    best, remarks = carried(maps.__getitem__, NAMES, LAP, False)
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
     assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
     set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, NEVER)}, set())
-    assert carried(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
+    assert select_legs(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
         "the physical figure lacks 14 % of weight with the legs of walk"
     )
 
@@ -99,7 +99,7 @@ def test_trial_hand_covers_the_whole_map(
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
     monkeypatch.setattr(rule, "map_poses", record_points)
-    toured(maps[1], LAP, parallel)
+    tour_animation(maps[1], LAP, parallel)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
     assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
@@ -112,7 +112,7 @@ def test_trial_hand_covers_the_whole_map(
 
 @pytest.mark.slow
 def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
-    assert sound(maps[1], LAP, False)
+    assert animation_is_sound(maps[1], LAP, False)
     walk, run = verdict_on(maps[1], LAP, False), verdict_on(maps[0], LAP, False)
     assert walk.bearable
     assert run.worse() > walk.worse()

@@ -80,7 +80,7 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
         return verdicts["whole" if part.legs_of is None else part.share]
 
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(push_trials, "tried", tried)
+    monkeypatch.setattr(push_trials, "cached_verdict", tried)
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: True)
     part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, remarks) == (legs, share, expected)
@@ -88,7 +88,7 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
 
 def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(push_trials, "tried", lambda *_: Verdict(0.01, np.inf))
+    monkeypatch.setattr(push_trials, "cached_verdict", lambda *_: Verdict(0.01, np.inf))
     monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
     part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)

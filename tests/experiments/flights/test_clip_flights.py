@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.certificates.flight.tolerance import Judging
+from controllers.certificates.flight.tolerance import JudgementCriteria
 from experiments.flights.ballistics import clip_ballistics, fly
 from models.humanoid.skeleton import figure_spec
 from models.mocap.dynamics.momentum import momentum
@@ -53,7 +53,7 @@ def test_certificate_inputs_depend_on_clip_and_tolerance():
     clip = embedded("jump")
     moved = Clip(clip.poses + np.eye(75)[0] * 1e-9, clip.fps, "jump")
     hashes = {
-        clip_ballistics(c, Judging(friction=mu)).certificate.inputs
+        clip_ballistics(c, JudgementCriteria(friction=mu)).certificate.inputs
         for c, mu in ((clip, 0.9), (clip, 0.8), (moved, 0.9))
     }
     assert len(hashes) == 3

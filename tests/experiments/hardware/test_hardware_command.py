@@ -10,7 +10,7 @@ import pytest
 from experiments.cli import main
 from experiments.hardware.doctor import MISSING, OK, findings, measured_lateness
 from sim.devices import hardware_list
-from sim.devices.hardware_list import FoundDevice, found_devices
+from sim.devices.hardware_list import FoundDevice, list_devices
 
 FIND = "sim.devices.vendor_library.ctypes.util.find_library"
 
@@ -98,7 +98,7 @@ def test_full_disk_is_reported_in_one_line(monkeypatch, capsys) -> None:
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(hardware_list, "found_devices", full)
+    monkeypatch.setattr(hardware_list, "list_devices", full)
     assert main(["hardware", "list"]) == 2
     assert capsys.readouterr().err == "hvf: the disk is full; expected room on it, or another --out\n"
 
@@ -113,7 +113,7 @@ def test_missing_hidapi_is_reported_with_install_command(monkeypatch, capsys) ->
 
 def test_installed_library_is_listed_and_inaccessible_node_gets_udev_rule(monkeypatch) -> None:
     monkeypatch.setattr(FIND, {"HD": "libHD.so"}.get)
-    (device,) = found_devices()
+    (device,) = list_devices()
     assert (device.name, device.transport, device.kind) == ("hdapi", "HDAPI", "vendor")
     node = FoundDevice(
         "hid:1", "usb", "hidraw", "/dev/hidraw9", 0x16C0, 0x486, "V", "P", "1", "phantom", "no permission", False

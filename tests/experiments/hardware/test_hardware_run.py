@@ -37,13 +37,13 @@ from experiments.files.device_files import (
 )
 from experiments.files.json_text import json_text
 from experiments.hardware.calibrate import Fixture, still_readings
-from experiments.hardware.permit import HAND_PUSH, check_device, verified
+from experiments.hardware.permit import DEFAULT_HAND_PUSH, check_device, verified
 from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.emulated import EmulatedPhantom
-from sim.hardware.identification import NAMES, Identified
+from sim.hardware.identification import NAMES, IdentificationResult
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.world.linkage import Linkage
@@ -51,8 +51,10 @@ from sim.world.linkage import Linkage
 KNOWN = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True)
 
 
-def found(**values: float) -> Identified:
-    return Identified(np.array([values.get(name, 1e-3) for name in NAMES]), np.full(len(NAMES), 1e-4), 1000, 0.001)
+def found(**values: float) -> IdentificationResult:
+    return IdentificationResult(
+        np.array([values.get(name, 1e-3) for name in NAMES]), np.full(len(NAMES), 1e-4), 1000, 0.001
+    )
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -189,10 +191,10 @@ def test_identify_and_calibrate_keep_each_others_results(tmp_path: Path) -> None
 )  # fmt: skip
 def test_certificate_of_another_field_names_the_differing_option(tmp_path: Path, changed, message) -> None:
     config = resolved(RunConfig())
-    inputs = certificate_inputs(config, 0.0, HandRange(), HAND_PUSH)
+    inputs = certificate_inputs(config, 0.0, HandRange(), DEFAULT_HAND_PUSH)
     certificate = Certificate({"stability": Verdict("certified", "it is")}, hash_of(inputs), hashes_of(inputs))
     (tmp_path / "certificate.json").write_text(json.dumps(certificate.to_json()))
-    (tmp_path / OPTIONS).write_text(json_text(certified_options(config, 0.0, HandRange(), HAND_PUSH)))
+    (tmp_path / OPTIONS).write_text(json_text(certified_options(config, 0.0, HandRange(), DEFAULT_HAND_PUSH)))
     assert verified(tmp_path, config, 0.0).inputs == certificate.inputs
     with pytest.raises(ChangedInputs, match=message) as refused:
         verified(tmp_path, resolved(replace(RunConfig(), **changed)), 0.0)

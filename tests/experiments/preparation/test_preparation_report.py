@@ -8,7 +8,7 @@ from experiments.preparation.prepared_file import changes, doubts
 from models.gravity import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.bounds import FLYING, RESIDUAL
+from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
@@ -41,8 +41,8 @@ def test_flights_raise_the_residual_bound():
     run = embedded("run")
     measures = well_formed(run, clip_flights(run))
     assert measures.flights > 0
-    assert RESIDUAL < FLYING
-    lacking = type(measures)(**{**vars(measures), "residual": (RESIDUAL + FLYING) / 2.0})
+    assert MAX_RESIDUAL < RESIDUAL_IN_FLIGHTS
+    lacking = type(measures)(**{**vars(measures), "residual": (MAX_RESIDUAL + RESIDUAL_IN_FLIGHTS) / 2.0})
     assert not any("contact lacks" in line for line in lacking.faults())
     assert any("contact lacks" in line for line in type(measures)(**{**vars(lacking), "flights": 0}).faults())
 

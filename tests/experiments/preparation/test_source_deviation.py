@@ -11,7 +11,7 @@ from models.humanoid.skeleton import JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
-from models.mocap.preparation.looping import looped
+from models.mocap.preparation.looping import close_or_rest
 from models.mocap.preparation.poses import resampled
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -89,7 +89,7 @@ def test_prepared_part_is_compared_at_the_times_of_the_file(tmp_path, pace):
     walk = embedded("walk")
     write_rig(RIGS[0], Clip(walk.poses[: walk.n_frames // 3], walk.fps, "walk"), tmp_path / "walk.bvh")
     clip, report, _ = load(tmp_path / "walk.bvh")
-    part = looped(resampled(Clip(clip.poses, pace * clip.fps, "walk"), 120.0), "open")
+    part = close_or_rest(resampled(Clip(clip.poses, pace * clip.fps, "walk"), 120.0), "open")
     assert part.start < -0.2
     result = SimpleNamespace(
         clip=part.clip, captured=clip, report=report, looped=part, paced=SimpleNamespace(pace=pace)

@@ -109,7 +109,7 @@ def test_loaded_capture_is_prepared_as_in_a_run(
     def far(self: object) -> np.ndarray:
         return np.vstack((np.r_[clip.fps, 0.0, np.zeros(73)], clip.poses))
 
-    monkeypatch.setattr(prepared_clip, "kept_array", lambda *args: args[-1]())
+    monkeypatch.setattr(prepared_clip, "cached_array", lambda *args: args[-1]())
     monkeypatch.setattr(prepared_clip._Capture, "_prepare", far)
     with pytest.warns(UserWarning, match=r"walker\.bvh: no feasible motion is near it"):
         hvf.load(capture)

@@ -13,7 +13,7 @@ import pytest
 import hvf
 from experiments.cli import main
 from experiments.files.device_files import save_device
-from experiments.results.folder import claimed
+from experiments.results.folder import locked_folder
 
 CURVE = hvf.circle(lap=2.0)
 
@@ -76,7 +76,7 @@ def test_part_of_wrong_type_is_refused_by_name(part: dict[str, Any], message: st
 
 def test_folder_in_use_is_refused_and_unchanged(tmp_path: Path) -> None:
     sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
-    with claimed(tmp_path):
+    with locked_folder(tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
         with pytest.raises(hvf.SimError, match="another run is being written into it"):
             sim.run(0.1, record=tmp_path, overwrite=True)

@@ -14,7 +14,7 @@ import hvf
 from experiments.cli import main
 from experiments.config.part import from_dict, to_dict
 from experiments.config.run_config import RunConfig, User
-from experiments.config.words import changed, run_config, words_of
+from experiments.config.words import options_of, run_config, with_options
 from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from sim.errors import SimError
@@ -76,7 +76,7 @@ def test_seed_with_replay_is_refused(seed: int) -> None:
         run_config(replay="runs/mine", seed=seed)
     with pytest.raises(hvf.ParameterError, match="whatever the seed; leave out the seed, or the replay"):
         simulation(follow(300.0), device=hvf.Replay("runs/mine"), seed=7)
-    assert changed(run_config(seed=7), {"replay": "runs/mine"}).seed == 1
+    assert with_options(run_config(seed=7), {"replay": "runs/mine"}).seed == 1
 
 
 def test_iterated_replay_ends_with_the_recording(recorded: hvf.Run) -> None:
@@ -145,12 +145,12 @@ def test_replay_is_reproduced_only_while_its_recording_is_unchanged(recorded: hv
 
 def test_replay_option_replaces_the_user() -> None:
     config = run_config(user="push", seconds=2.0, cutoff=100.0)
-    assert changed(config, {"replay": "runs/mine"}) == run_config(replay="runs/mine", seconds=2.0)
+    assert with_options(config, {"replay": "runs/mine"}) == run_config(replay="runs/mine", seconds=2.0)
 
 
 def test_replay_round_trips_through_words_and_dict() -> None:
     config = run_config(mode="bunny", replay="runs/mine")
-    assert run_config(**words_of(config)) == config  # pyright: ignore[reportArgumentType]
+    assert run_config(**options_of(config)) == config  # pyright: ignore[reportArgumentType]
     assert from_dict(RunConfig, to_dict(config), "here") == config
 
 

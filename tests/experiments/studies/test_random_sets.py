@@ -7,7 +7,7 @@ import pytest
 from experiments.preparation.followed import followed
 from experiments.studies import random_sets
 from models.mocap.library import load_clip
-from models.mocap.preparation.bounds import RESIDUAL
+from models.mocap.preparation.bounds import MAX_RESIDUAL
 
 MOCAP = Path(__file__).resolve().parents[3].parent / "shared" / "mocap"
 FILES = ("snu/walk.bvh", "xia/strutting_01_000.bvh", "cmu_amc/02_01.amc", "xia/dme_example.bvh")
@@ -26,7 +26,7 @@ def captures(monkeypatch):
 @pytest.mark.slow
 def test_random_set_stands_without_skating(captures):
     found = [random_sets.captured(captures, name) for name in FILES]
-    assert [one.name for one, _ in found if one.reason or one.alone > RESIDUAL] == []
+    assert [one.name for one, _ in found if one.reason or one.alone > MAX_RESIDUAL] == []
     chosen = next(random_sets.drawn([clip for _, clip in found], 4, seed=1))
     assert sorted(clip.name for clip in chosen) == sorted(FILES)
     row = random_sets.run_set(0, "cylindrical", chosen, 1, "push", captures)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.certificates.flight.tolerance import JUDGING
+from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA
 from experiments.flights.ballistics import clip_ballistics
 from experiments.studies.turn_trials import follow, parabola, trial
 from models.mocap.library import embedded
@@ -18,11 +18,14 @@ def test_refuted_turns_are_missed_and_feasible_ones_followed(name, pace):
     verdict = played.certificate.verdicts["turns"]
     assert verdict.verdict == "refuted"
     example = verdict.counterexample
-    outcome = trial(played.motion, example, JUDGING.friction)
+    outcome = trial(played.motion, example, DEFAULT_CRITERIA.friction)
     assert outcome.onset == pytest.approx(outcome.rate, rel=0.005)
     assert min(outcome.miss, outcome.miss_of_mean) > outcome.bound > 3e-3
     seconds = (example["end"] - example["start"]) / played.motion.fps
-    assert parabola(example["acceleration"], seconds, JUDGING.friction, 0.98 * outcome.rate).miss < 0.1 * outcome.bound
+    assert (
+        parabola(example["acceleration"], seconds, DEFAULT_CRITERIA.friction, 0.98 * outcome.rate).miss
+        < 0.1 * outcome.bound
+    )
 
 
 def test_only_friction_limits_the_followed_motion():

@@ -13,7 +13,7 @@ from experiments.trials.design.errors import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from experiments.trials.trial import run_trial
-from experiments.trials.trial.run_trial import Row, Shelf, Task, perform
+from experiments.trials.trial.run_trial import MapCache, Row, Task, perform_trial
 from sim.compilation.sources import reached_code
 from sim.recording.recording import Recording
 
@@ -76,7 +76,7 @@ def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
     factors = {"around": {"near": {"radius": 0.0477}, "far": {"radius": 0.4}}}
     study = small_study(factors=factors, users={"number": 2})
     trials = study.trials
-    rows = [perform(Task(trial.key, to_json(trial.config)), Shelf()) for trial in trials]
+    rows = [perform_trial(Task(trial.key, to_json(trial.config)), MapCache()) for trial in trials]
     states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
     assert states == {"near": "done", "far": "failed"}
     assert all("reach" in row.reason or "stops" in row.reason for row in rows if row.state == "failed")
@@ -85,7 +85,7 @@ def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
 def test_measures_of_tracing_and_exaggerating_tasks() -> None:
     task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
     study = small_study(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
-    rows = {t.meeting.condition.levels["task"]: perform(Task(t.key, to_json(t.config))) for t in study.trials}
+    rows = {t.meeting.condition.levels["task"]: perform_trial(Task(t.key, to_json(t.config))) for t in study.trials}
     assert {row.state for row in rows.values()} == {"done"}
     for task, nothing, something in (
         ("trace", "expressiveness", "tracking_error"),
@@ -103,14 +103,14 @@ def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(run_trial, "_simulate", full)
     with pytest.raises(OSError, match="No space left"):
-        perform(Task(trial.key, to_json(trial.config)))
+        perform_trial(Task(trial.key, to_json(trial.config)))
 
 
 def test_shared_maps_do_not_change_the_measures() -> None:
     trials = small_study().trials[:3]
-    shelf = Shelf()
-    shared = [perform(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
-    alone = [perform(Task(t.key, to_json(t.config)), Shelf()).measures for t in trials]
+    shelf = MapCache()
+    shared = [perform_trial(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
+    alone = [perform_trial(Task(t.key, to_json(t.config)), MapCache()).measures for t in trials]
     assert shared == alone
 
 
@@ -118,11 +118,11 @@ def test_recordings_are_stored_at_the_given_url(tmp_path: Path) -> None:
     pytest.importorskip("fsspec")
     trial = small_study().trials[0]
     (tmp_path / "kept").mkdir()
-    row = perform(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
+    row = perform_trial(Task(trial.key, to_json(trial.config), f"file://{tmp_path}/kept"))
     with Recording(tmp_path / "kept" / f"{trial.key}.h5") as recording:
         assert recording.complete
         assert len(recording.channel("ticks", "t")) == 500
-    assert row.measures == perform(Task(trial.key, to_json(trial.config))).measures
+    assert row.measures == perform_trial(Task(trial.key, to_json(trial.config))).measures
 
 
 def test_invalid_recordings_url_is_refused_before_the_first_trial(tmp_path: Path) -> None:

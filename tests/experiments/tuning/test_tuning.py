@@ -12,7 +12,7 @@ import hvf
 from controllers.certificates.loop import governed
 from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
-from experiments.certify.kept_stability import Stability, kept_stability
+from experiments.certify.kept_stability import Stability, cached_stability
 from experiments.config.run_config import load_config
 from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
@@ -22,7 +22,7 @@ from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
-from experiments.tuning.search import Candidate, chosen, front, search, violation_of
+from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, violation_of
 from experiments.tuning.storage import storage_of
 from experiments.tuning.tune import TunedSimulation
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
@@ -48,7 +48,7 @@ def certificates(monkeypatch: pytest.MonkeyPatch) -> None:
         margin = 5000.0 / config.mode.stiffness - 1.0
         return Stability("certified" if margin > 0.0 else "refuted", margin, "a boundary at 5000 N/m")
 
-    monkeypatch.setattr(searching, "kept_stability", verdict)
+    monkeypatch.setattr(searching, "cached_stability", verdict)
 
 
 def searched(config: TuneConfig, folder: Path, sampler: str = "tpe") -> list[Candidate]:
@@ -100,7 +100,7 @@ def test_candidate_with_a_failed_trial_is_not_chosen(tmp_path: Path) -> None:
     with Database(tmp_path / "tune.sqlite", "identity", "t", "") as database:
         config, storage = tuning(candidates=1, prune=False), storage_of(tmp_path / "journal")
         found = search(config, storage, "identity", Panel(database, _Failing()), "random", lambda n: None)
-    assert chosen(found, config.directions) is None
+    assert best_candidate(found, config.directions) is None
     assert found[-1].state == "given up"
 
 
@@ -160,11 +160,11 @@ def test_constraint_follows_verdict_and_margin(verdict: str, margin: float | Non
 def test_pareto_front_and_its_middle_choice() -> None:
     places = [(1.0, 9.0), (2.0, 3.0), (9.0, 1.0), (3.0, 4.0), (9.0, 9.0)]
     found = [Candidate({"k": float(i)}, place, "certified", 1.0, "tried") for i, place in enumerate(places)]
-    assert [c.objectives for c in front(found, ["minimize", "minimize"])] == places[:3]
-    best = chosen(found, ["minimize", "minimize"])
+    assert [c.objectives for c in pareto_front(found, ["minimize", "minimize"])] == places[:3]
+    best = best_candidate(found, ["minimize", "minimize"])
     assert best is not None
     assert best.objectives == (2.0, 3.0)
-    assert [c.objectives for c in front(found, ["minimize", "maximize"])] == [(1.0, 9.0)]
+    assert [c.objectives for c in pareto_front(found, ["minimize", "maximize"])] == [(1.0, 9.0)]
 
 
 @pytest.mark.parametrize(
@@ -197,23 +197,23 @@ def test_example_tunings_can_be_read(name: str) -> None:
 
 @pytest.mark.slow
 def test_stability_of_lead_mode_is_unknown() -> None:
-    assert kept_stability(run_config(mode="lead")).verdict == "unknown"
+    assert cached_stability(run_config(mode="lead")).verdict == "unknown"
 
 
 def test_verdict_without_number_has_no_margin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(governed, "governed_stability", lambda *given: Verdict("unknown", "no boundary was found"))
-    found = kept_stability(run_config(figure="none"))
+    found = cached_stability(run_config(figure="none"))
     assert (found.verdict, found.margin, found.reason) == ("unknown", None, "no boundary was found")
 
 
 @pytest.mark.slow
 def test_cached_verdict_equals_the_computed_one_and_follows_the_gain() -> None:
-    soft, stiff = (kept_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
+    soft, stiff = (cached_stability(run_config(stiffness=k, figure="none")) for k in (300.0, 1e5))
     assert (soft.verdict, stiff.verdict) == ("certified", "refuted")
-    assert kept_stability(run_config(stiffness=300.0, figure="none")) == soft
+    assert cached_stability(run_config(stiffness=300.0, figure="none")) == soft
     assert soft.margin is not None
-    doubled = kept_stability(run_config(stiffness=600.0, figure="none"))
+    doubled = cached_stability(run_config(stiffness=600.0, figure="none"))
     assert doubled.used == pytest.approx(2.0 * soft.used, rel=1e-3)  # the critical gain is the same
 
 
@@ -223,7 +223,7 @@ def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
     config_of_run = load_config(tmp_path / CHOSEN)
     assert config_of_run.mode.stiffness == found.values["stiffness"]  # pyright: ignore
-    assert kept_stability(config_of_run).verdict == "certified"
+    assert cached_stability(config_of_run).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
 

@@ -4,7 +4,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES, JOINTS, figure_model, rest_pose, torque_limit
-from sim.body.feedback import rotation_error, turned
+from sim.body.feedback import rotate_by_vector, rotation_error
 from sim.body.figure import CONTACTS, Figure, FigureGains
 from sim.body.figure_state import REPORT_RESIDUAL, REPORT_SATURATED, REPORT_SUPPORT
 from sim.body.stance import N_LEG, stance_response
@@ -52,7 +52,7 @@ def test_rotation_error_and_rotated_vector_equal_scipy():
         error, out, vector = np.empty(3), np.empty(3), rng.normal(size=3)
         rotation_error(a.as_quat(scalar_first=True), b.as_quat(scalar_first=True), error)
         np.testing.assert_allclose(error, (a.inv() * b).as_rotvec(), atol=1e-9)
-        turned(error, vector, out)
+        rotate_by_vector(error, vector, out)
         np.testing.assert_allclose(out, Rotation.from_rotvec(error).apply(vector), atol=1e-12)
 
 

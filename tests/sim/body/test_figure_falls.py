@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from models.humanoid.skeleton import JOINTS, figure_model, rest_pose
 from models.mocap.library import embedded
 from sim.body.clip_motion import clip_motion
-from sim.body.falls import DOWN, LIES, RISES, SET_BACK, UP
+from sim.body.falls import DOWN, LYING_TIME, RECOVERING, RECOVERY_TIME, UP
 from sim.body.figure import Figure
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_SUPPORT, FigureGains
 from sim.body.tracking import TrackingConfig, floor_world
@@ -66,9 +66,9 @@ def test_fallen_figure_lies_on_the_floor_and_is_set_back_on_the_animation() -> N
         if k % 40 == 0:
             lows.append(lowest_point_by_geoms(model, data))
     changes = [modes[k] for k in (0, *(np.flatnonzero(np.diff(modes)) + 1))]
-    assert changes == [UP, DOWN, SET_BACK, UP]
-    assert modes.count(SET_BACK) * figure.period == pytest.approx(RISES, abs=0.01)
-    assert modes.count(DOWN) * figure.period >= LIES
+    assert changes == [UP, DOWN, RECOVERING, UP]
+    assert modes.count(RECOVERING) * figure.period == pytest.approx(RECOVERY_TIME, abs=0.01)
+    assert modes.count(DOWN) * figure.period >= LYING_TIME
     assert min(lows) > -0.02
     assert np.linalg.norm(data.qpos[:3] - standing()[:3]) < 0.01
     assert figure.state.fall.state[2] == 1.0
@@ -88,7 +88,7 @@ def test_thrown_figure_recovers_to_a_moving_animation_without_divergence(name: s
     for pose, velocity, acceleration in zip(*rows, strict=True):
         figure.update(pose, velocity, acceleration)
         modes.append(figure.state.report[REPORT_DOWN])
-        if modes[-1] == UP and SET_BACK in modes:
+        if modes[-1] == UP and RECOVERING in modes:
             break
         mujoco.mj_step(model, data, 4)
     assert modes[-1] == UP

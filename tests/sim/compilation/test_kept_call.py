@@ -10,7 +10,7 @@ from numba.core.runtime import _nrt_python, rtsys
 
 from controllers.state import Array
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import KeptCall
+from sim.compilation.kept_call import BoundCall
 
 
 class Parts(NamedTuple):
@@ -29,7 +29,7 @@ def add(parts: Parts, number: int, twice: bool, into: Array) -> None:
 def test_call_equals_the_direct_call_and_allocates_nothing() -> None:
     parts, into, other = Parts(np.arange(5.0), 3.0), np.zeros(5), np.zeros(5)
     number = np.array([7.0])
-    call = KeptCall(add, (parts,), number, (True, into))
+    call = BoundCall(add, (parts,), number, (True, into))
     add(parts, 7, True, other)
     _nrt_python.memsys_enable_stats()
     try:
@@ -47,7 +47,7 @@ def test_call_equals_the_direct_call_and_allocates_nothing() -> None:
 
 
 def test_exceptions_of_the_function_are_raised() -> None:
-    call = KeptCall(add, (Parts(np.zeros(2), 1.0),), np.array([-1.0]), (False, np.zeros(2)))
+    call = BoundCall(add, (Parts(np.zeros(2), 1.0),), np.array([-1.0]), (False, np.zeros(2)))
     with pytest.raises(ValueError, match="no such number"):
         call()
 
@@ -55,7 +55,7 @@ def test_exceptions_of_the_function_are_raised() -> None:
 def test_arguments_live_exactly_as_long_as_the_call() -> None:
     into = np.zeros(3)
     reference = weakref.ref(into)
-    call = KeptCall(add, (Parts(np.ones(3), 1.0),), np.array([2.0]), (False, into))
+    call = BoundCall(add, (Parts(np.ones(3), 1.0),), np.array([2.0]), (False, into))
     del into
     gc.collect()
     call()

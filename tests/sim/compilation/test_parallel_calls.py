@@ -2,20 +2,20 @@
 
 from pathlib import Path
 
-from sim.compilation.side_by_side import processors, side_by_side
+from sim.compilation.side_by_side import processors, run_in_workers
 
 
 def test_side_effects_of_calls_remain_and_failed_calls_are_left_out(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("a", "b", "missing/c", "d")]
     ended: list[int] = []
-    side_by_side([(Path.mkdir, (folder,)) for folder in folders], ended.append)
+    run_in_workers([(Path.mkdir, (folder,)) for folder in folders], ended.append)
     assert sorted(ended) == [0, 1, 3]
     assert [folder.is_dir() for folder in folders] == [True, True, False, True]
 
 
 def test_printed_numbers_are_not_taken_for_call_indices() -> None:
     ended: list[int] = []
-    side_by_side([(print, ("7",)), (print, ("no number",))], ended.append)
+    run_in_workers([(print, ("7",)), (print, ("no number",))], ended.append)
     assert sorted(ended) == [0, 1]
 
 

@@ -17,7 +17,7 @@ from models.gravity import GRAVITY
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
 from sim.hardware.gated_servo import Ticker
-from sim.hardware.identification import NAMES, WINDOW, Identified, Motion, identify_linkage, motions_of
+from sim.hardware.identification import NAMES, WINDOW, IdentificationResult, Motion, identify_linkage, motions_of
 from sim.world.linkage import Linkage
 from tests.sim.hardware.emulation import UNRAMPED_GATE, gated_servo, run
 
@@ -73,8 +73,8 @@ def motions_and_truth(seed: int) -> tuple[list[Motion], np.ndarray]:
     return [simulated_motion(linkage, extra_mass, curve(lap)) for lap in LAPS], true_values(linkage, extra_mass)
 
 
-def identified(seed: int) -> tuple[Identified, np.ndarray]:
-    """Identified and true parameters of a device."""
+def identified(seed: int) -> tuple[IdentificationResult, np.ndarray]:
+    """IdentificationResult and true parameters of a device."""
     motions, hidden = motions_and_truth(seed)
     return identify_linkage(motions), hidden
 
@@ -85,7 +85,7 @@ def device_motions() -> tuple[list[Motion], np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def identification(device_motions) -> tuple[Identified, np.ndarray]:
+def identification(device_motions) -> tuple[IdentificationResult, np.ndarray]:
     motions, hidden = device_motions
     return identify_linkage(motions), hidden
 

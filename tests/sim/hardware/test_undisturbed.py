@@ -3,7 +3,7 @@
 import multiprocessing
 import signal
 
-from sim.hardware.undisturbed import start_undisturbed
+from sim.hardware.undisturbed import start_without_sigint
 
 
 def report_blocked(answer) -> None:
@@ -14,7 +14,7 @@ def test_process_starts_with_sigint_blocked_and_parent_keeps_it_unblocked() -> N
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=report_blocked, args=(theirs,), daemon=True)
-    start_undisturbed(process)
+    start_without_sigint(process)
     theirs.close()
     assert ours.recv()
     process.join()

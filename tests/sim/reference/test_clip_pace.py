@@ -8,7 +8,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.haptic_map.river_memory import PHASE, SHOWN
+from controllers.haptic_map.river_memory import CLIP_PHASE, HAND_PHASE
 from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.setups.parts.clips import load_clips
@@ -45,7 +45,7 @@ def _played(clips: RiverClips, phases: np.ndarray) -> Played:
         traces[0, TRACE_PHASE] = phase % LAP
         reference_along(reference, point[None], traces, poses)
         memory = reference.memory
-        rows.append((memory[PHASE], memory[SHOWN], reference.velocity.copy(), reference.acceleration.copy()))
+        rows.append((memory[HAND_PHASE], memory[CLIP_PHASE], reference.velocity.copy(), reference.acceleration.copy()))
     hand, clip, velocity, acceleration = zip(*rows, strict=True)
     hand, clip = (np.unwrap(np.array(values), period=LAP) for values in (hand, clip))
     return Played(hand, clip, np.array(velocity), np.array(acceleration))

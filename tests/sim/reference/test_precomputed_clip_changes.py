@@ -10,7 +10,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.haptic_map.river_memory import CHANGE, COURSE, RIVER
+from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER, TRANSITION
 from controllers.state import stylus_path
 from experiments.config.words import run_config
 from experiments.fitting import river_changes, river_tour
@@ -67,9 +67,9 @@ def test_change_begins_at_its_gate_ends_in_the_other_clip_without_jumps(map_with
     poses, memory = _played(map_with_changes, ((begins, 1),), 2.0 * LAP)
     t = np.arange(len(poses)) * PERIOD
     # The course of the hand changes at once, while the clip plays on to the gate.
-    assert t[memory[:, COURSE] == 1.0][0] < begins + 0.1
-    assert t[memory[:, RIVER] == 1.0][0] == pytest.approx(gate if gate > begins + 0.05 else gate + LAP, abs=0.05)
-    passing = t[memory[:, CHANGE] >= 0.0]
+    assert t[memory[:, TIMING_RIVER] == 1.0][0] < begins + 0.1
+    assert t[memory[:, ACTIVE_RIVER] == 1.0][0] == pytest.approx(gate if gate > begins + 0.05 else gate + LAP, abs=0.05)
+    passing = t[memory[:, TRANSITION] >= 0.0]
     assert passing[-1] - passing[0] == pytest.approx(change.seconds, abs=0.1)
     rate = pose_difference(poses[:-1], poses[1:]) / PERIOD
     velocity_steps = np.abs(np.diff(rate, axis=0))[round(0.5 / PERIOD) :]
@@ -78,7 +78,7 @@ def test_change_begins_at_its_gate_ends_in_the_other_clip_without_jumps(map_with
     assert velocity_steps[:, :3].max() < 0.05
     after = round((passing[-1] + 0.2) / PERIOD)
     own = map_with_changes.compiled().memory
-    own[RIVER] = own[COURSE] = 1.0
+    own[ACTIVE_RIVER] = own[TIMING_RIVER] = 1.0
     alone = map_poses(map_with_changes, stylus_path(CURVES[1].point(t[after : after + 1] % LAP)), own)
     assert np.abs(pose_difference(alone, poses[after : after + 1])[0, 6:]).max() < 0.02
 
@@ -87,9 +87,9 @@ def test_hand_that_returns_before_the_gate_causes_no_change(map_with_changes: Ri
     gate = map_with_changes.changes[0].gates[0]
     leaves = (gate + 0.3) % LAP
     poses, memory = _played(map_with_changes, ((LAP + leaves, 1), (LAP + leaves + 0.6, 0)), 2.6 * LAP)
-    assert np.all(memory[:, RIVER] == 0.0)
-    assert np.any(memory[:, COURSE] == 1.0)
-    assert memory[-1, COURSE] == 0.0
+    assert np.all(memory[:, ACTIVE_RIVER] == 0.0)
+    assert np.any(memory[:, TIMING_RIVER] == 1.0)
+    assert memory[-1, TIMING_RIVER] == 0.0
     rate = pose_difference(poses[:-1], poses[1:]) / PERIOD
     assert np.abs(np.diff(rate, axis=0))[round(0.5 / PERIOD) :, 6:].max() < 1.5
 
@@ -104,9 +104,9 @@ def test_change_without_precomputed_passage_goes_by_offsets(
 def test_map_is_unchanged_where_no_change_is_found(
     map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(river_changes, "kept_folder", lambda module: tmp_path)
+    monkeypatch.setattr(river_changes, "results_folder", lambda module: tmp_path)
     # Other processes would not see the patched `_make_passage`.
-    monkeypatch.setattr(river_changes, "side_by_side", lambda calls: [call(*given) for call, given in calls])
+    monkeypatch.setattr(river_changes, "run_in_workers", lambda calls: [call(*given) for call, given in calls])
     monkeypatch.setattr(river_changes, "_make_passage", lambda *rest: None)
     for _ in range(2):  # computed, and loaded from the cache
         haptic_map = river_changes.with_changes(map_with_offsets, 0.4, FIGURE)
@@ -163,7 +163,7 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
 ) -> None:
     from experiments.config.run_config import Figure
 
-    monkeypatch.setattr(river_tour, "tried", lambda *rest: verdict)
+    monkeypatch.setattr(river_tour, "cached_verdict", lambda *rest: verdict)
     assert river_tour.not_followed(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
 
 

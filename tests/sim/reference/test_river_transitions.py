@@ -9,7 +9,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.legs.sole_heights import SWINGS
+from controllers.legs.sole_heights import SWING_HEIGHT
 from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
@@ -28,7 +28,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 from models.mocap.motion.clip import pose_difference
 from sim.reference.reference import make_reference, reference_along
-from sim.reference.transition import DWELL
+from sim.reference.transition import DWELL_TIME
 from tests.sim.gliding_hand import gliding_hand
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "river_clips.csv"
@@ -57,7 +57,7 @@ def _played(clips: RiverClips, blend: float, without_river_between: bool = False
 
 def _at_changes(values: np.ndarray) -> np.ndarray:
     """Largest value in the rows from three before to three after each change."""
-    rows = [round((moment + DWELL) / PERIOD) for moment, _ in CHANGES]
+    rows = [round((moment + DWELL_TIME) / PERIOD) for moment, _ in CHANGES]
     return np.array([values[k - 3 : k + 3].max() for k in rows])
 
 
@@ -103,7 +103,7 @@ def test_feet_in_contact_step_instead_of_sliding(clips_of_rivers) -> None:
     height = points[..., 2] - FIGURE.geom_size[ids, 0]
     step = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
     for moment, _ in CHANGES:
-        first, last = round((moment + DWELL) / PERIOD), round((moment + DWELL + BLEND) / PERIOD)
+        first, last = round((moment + DWELL_TIME) / PERIOD), round((moment + DWELL_TIME + BLEND) / PERIOD)
         assert height[first:last].min() > -0.003
         for side in ("left", "right"):
             of_side = [k for k, name in enumerate(FOOT_CONTACTS) if name.startswith(side)]
@@ -222,7 +222,9 @@ def test_stopped_figure_is_in_balance_only_with_rest_phases(clips_of_rivers) -> 
             mujoco.mj_kinematics(FIGURE, data)
             mujoco.mj_comPos(FIGURE, data)
             centre, soles = data.subtree_com[1, :2], data.geom_xpos[feet] - [0.0, 0.0, CONTACT_RADIUS]
-            missing.append(np.linalg.norm(nearest_supported(centre, soles[:, :2], soles[:, 2] < SWINGS, 0.9) - centre))
+            missing.append(
+                np.linalg.norm(nearest_supported(centre, soles[:, :2], soles[:, 2] < SWING_HEIGHT, 0.9) - centre)
+            )
         assert (max(missing) < 1e-3) == balanced
 
 

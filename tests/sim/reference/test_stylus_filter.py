@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.reference.stylus_filter import smooth_hand, smooth_turn, turned_on
+from sim.reference.stylus_filter import extrapolate_orientation, smooth_hand, smooth_turn
 
 SMOOTHING, PERIOD = 0.74, 8e-3
 RNG = np.random.default_rng(3)
@@ -29,7 +29,7 @@ def test_constant_orientation_is_returned_bit_for_bit() -> None:
             smooth_turn(q, turning, measured, SMOOTHING, PERIOD)
         np.testing.assert_array_equal(q, measured)
         np.testing.assert_array_equal(turning, 0.0)
-        np.testing.assert_array_equal(turned_on(q, turning, PERIOD), measured)
+        np.testing.assert_array_equal(extrapolate_orientation(q, turning, PERIOD), measured)
 
 
 def test_rotation_about_one_axis_equals_the_position_filter() -> None:
@@ -61,7 +61,7 @@ def test_constant_angular_acceleration_is_followed_without_lag() -> None:
     np.testing.assert_allclose(turning[0], (0.7 + 1.6 * t) * axis, atol=1e-8)
     np.testing.assert_allclose(turning[1], 1.6 * axis, atol=1e-6)
     for s in (-PERIOD, PERIOD):
-        assert _angle(np.array(turned_on(q, turning, s)), orientation(t + s)) < 1e-12
+        assert _angle(np.array(extrapolate_orientation(q, turning, s)), orientation(t + s)) < 1e-12
 
 
 def test_encoder_step_is_spread_over_several_periods() -> None:

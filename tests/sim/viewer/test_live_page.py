@@ -7,10 +7,10 @@ import pytest
 from models.world.scene import SceneConfig, world_model
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
-from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, taken_at
+from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, workspace_position
 from sim.viewer.page import NullPage
-from sim.viewer.shapes import body_shapes, coarser
-from sim.viewer.shown import Shown
+from sim.viewer.shapes import body_shapes, simplify_shapes
+from sim.viewer.shown import Moment
 
 ANGLE = np.linspace(0, 6, 30)
 CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
@@ -25,11 +25,11 @@ def page():
     page.close()
 
 
-def shown_state(model, p=(0.0, 0.0, 0.0), force=(0.0, 0.0, 0.0), target=NO_TARGET, t=0.0, root=0.0) -> Shown:
+def shown_state(model, p=(0.0, 0.0, 0.0), force=(0.0, 0.0, 0.0), target=NO_TARGET, t=0.0, root=0.0) -> Moment:
     qpos = np.array(model.qpos0)
     at = int(model.jnt_qposadr[model.joint("figure/root").id])
     qpos[at] += root
-    return Shown(t, qpos, qpos[at : at + 75], np.array(p), np.array(force), np.zeros(3), np.array(target))
+    return Moment(t, qpos, qpos[at : at + 75], np.array(p), np.array(force), np.zeros(3), np.array(target))
 
 
 def test_force_arrow_starts_at_the_tip_and_points_along_the_force(page):
@@ -79,12 +79,12 @@ def test_camera_follows_a_travelling_figure_and_not_a_dancing_one(page):
 
 def test_taken_at_inverts_drawn_at():
     points = np.random.default_rng(1).normal(size=(5, 3))
-    np.testing.assert_allclose(taken_at(drawn_at(points)), points, atol=1e-15)
+    np.testing.assert_allclose(workspace_position(drawn_at(points)), points, atol=1e-15)
 
 
 def test_coarser_shapes_lie_within_a_cell_of_the_fine_ones():
     fine = body_shapes(world_model(SceneConfig()), "figure/")
-    coarse = coarser(fine, 0.01)
+    coarse = simplify_shapes(fine, 0.01)
     assert sum(len(s.faces) for s in coarse) < 0.5 * sum(len(s.faces) for s in fine)
     for a, b in zip(fine, coarse, strict=True):
         assert b.faces.max() < len(b.vertices)

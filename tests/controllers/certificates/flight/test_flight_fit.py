@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controllers.certificates.flight.flight_fit import best_fall, find_flights, fit_flight, reachable_rates
+from controllers.certificates.flight.flight_fit import find_flights, fit_flight, fit_free_fall, reachable_rates
 from controllers.gravity import GRAVITY
 
 FPS = 120.0
@@ -87,7 +87,7 @@ def test_best_fall_attains_the_chebyshev_distance(gravity, rate):
     # The best line under a parabola of curvature a over T misses it by |a| T² / 16.
     com = parabola(gravity)
     T = 60 / FPS / rate
-    distance, (p, v) = best_fall(com, FPS, rate)
+    distance, (p, v) = fit_free_fall(com, FPS, rate)
     assert distance == pytest.approx(abs(gravity * rate**2 - GRAVITY) * T**2 / 16, rel=2e-2, abs=1e-6)
     t = np.arange(61)[:, None] / (FPS * rate)
     fall = p + v * t - np.array([0.0, 0.0, GRAVITY / 2]) * t**2

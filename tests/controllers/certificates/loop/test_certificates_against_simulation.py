@@ -15,8 +15,8 @@ from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import (
-    EVERYTHING,
-    LAP,
+    FULL_CONDITIONS,
+    LAP_DURATION,
     Conditions,
     Trial,
     draw_trial,
@@ -29,12 +29,12 @@ from sim.users.hand.arm import Arm
 pytestmark = pytest.mark.slow
 
 CIRCLE = Trajectory.circle(0.0477, 4.0)
-STILL = Trajectory.circle(0.0477, LAP)
+STILL = Trajectory.circle(0.0477, LAP_DURATION)
 RIVER = River(FOLLOW_LAW, 300.0, 4.0, 0.25, CIRCLE, phantom_device(), Sampling(1e-3))
 
 
 def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
-    return Trial(STILL, phase * LAP / 4.0, river.b_d, river.sampling, hand, np.array(direction))
+    return Trial(STILL, phase * LAP_DURATION / 4.0, river.b_d, river.sampling, hand, np.array(direction))
 
 
 def test_onset_of_instability_is_at_the_predicted_stiffness():
@@ -47,7 +47,7 @@ def test_onset_of_instability_is_at_the_predicted_stiffness():
 
 def test_coulomb_friction_raises_the_onset_as_its_describing_function_predicts():
     sampling = Sampling(1.2e-3, 3.6e-3)
-    trial = Trial(STILL, 0.2 * LAP, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
+    trial = Trial(STILL, 0.2 * LAP_DURATION, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
     friction_onset = with_friction(trial, 1e-3)
     assert friction_onset.k_r > 1.03 * predicted(trial)
     assert observed_with_friction(trial, friction_onset, 1e-3, Conditions(coulomb=True)) == pytest.approx(
@@ -59,7 +59,7 @@ def test_coulomb_friction_raises_the_onset_as_its_describing_function_predicts()
 
 
 def test_integrator_lead_is_half_a_physics_step():
-    trial = Trial(STILL, 0.2 * LAP, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    trial = Trial(STILL, 0.2 * LAP_DURATION, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
     expected = predicted(trial)
     integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     coarse, fine = (observed(trial, expected, Conditions(steps, integrator)) / expected - 1.0 for steps in (8, 64))
@@ -99,7 +99,7 @@ def test_certified_river_does_not_diverge_with_random_hands():
         inverse = np.linalg.inv(loop.linear.jacobian[0])
         state[:3], state[3:6] = inverse @ rng.normal(scale=2e-3, size=3), inverse @ rng.normal(scale=0.1, size=3)
         state[6:9], state[9:12] = state[:3], state[3:6]
-        path = simulate(trial, RIVER.k_r, 400, EVERYTHING, state)
+        path = simulate(trial, RIVER.k_r, 400, FULL_CONDITIONS, state)
         assert len(path) == 400
         # Friction holds it short of the curve: at f_c/k_r, 0.06 N over 300 N/m.
         assert np.linalg.norm(path[300:], axis=1).max() < 6e-4

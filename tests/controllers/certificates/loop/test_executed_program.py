@@ -1,7 +1,7 @@
 """The linearised loop of an executed program: spectral radius at states along the curve."""
 
 import hvf
-from controllers.certificates.loop.executed import looked_at
+from controllers.certificates.loop.executed import examine_curve
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampled_loop import SampledLoop
@@ -20,10 +20,10 @@ def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
 
 
 def test_executed_radius_matches_symbolic_loop():
-    stable = looked_at(
+    stable = examine_curve(
         Follow(CIRCLE, 300.0, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4
     )
-    oscillating = looked_at(
+    oscillating = examine_curve(
         Follow(CIRCLE, 2e4, 8.0, 0.25).program(), river(k_r=1.0, b_d=0.0), 0.02, [HandImpedance()], n=4
     )
     assert stable.radius < 1.0 < oscillating.radius
@@ -39,7 +39,7 @@ def test_time_dependent_law_is_evaluated_in_the_first_lap():
     def growing_with_time(hand, k=0.01):
         return 0.0, 0.0, -k * hand.t
 
-    linearised = looked_at(
+    linearised = examine_curve(
         (Follow(CIRCLE, 300.0, 8.0, 0.25) + growing_with_time).program(), river(), 0.02, [HandImpedance()], n=4
     )
     assert linearised.radius < 1.0

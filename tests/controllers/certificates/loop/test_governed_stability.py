@@ -1,6 +1,6 @@
 """Stability of a loop with a speed governor: certified, refuted, and unknown in between."""
 
-from controllers.certificates.loop.governed import governed_stability, most_drag
+from controllers.certificates.loop.governed import governed_stability, max_drag
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampled_loop import SampledLoop
@@ -28,5 +28,5 @@ def test_governor_drag_is_certified_by_circle_criterion_or_refuted_if_unstable()
 
 def test_circle_criterion_drag_is_below_critical_drag():
     loop = SampledLoop(river().still(), Sampling(1e-3))
-    assert 0.3 < most_drag(loop, 300.0, 8.0) / 70.0 < 1.0
-    assert most_drag(loop, 20_000.0, 8.0) == 0.0
+    assert 0.3 < max_drag(loop, 300.0, 8.0) / 70.0 < 1.0
+    assert max_drag(loop, 20_000.0, 8.0) == 0.0

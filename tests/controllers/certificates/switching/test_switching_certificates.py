@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
-from controllers.certificates.switching.switching import Keeping, Sharing, hysteresis_dwell, switching
+from controllers.certificates.switching.switching import HandRetention, SelectionRule, hysteresis_dwell, switching
 from controllers.certificates.switching.switching_search import SECONDS, Course, Push, counterexample, failure
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
@@ -35,9 +35,9 @@ def _rivers(field, clock=CLOCK):
 
 
 def _both_keepings(field, clock=CLOCK):
-    sharing = Sharing(field.admission, field.sigma, field.hysteresis, field.form, field.look)
+    sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
     first, second = _rivers(field, clock)
-    return [Keeping(first, (second,), sharing), Keeping(second, (first,), sharing)]
+    return [HandRetention(first, (second,), sharing), HandRetention(second, (first,), sharing)]
 
 
 def _found_counterexample(field, clock, newtons):
@@ -185,9 +185,9 @@ def test_dwell_time_falls_with_push_and_is_one_period_without_hysteresis():
 
 def test_lag_of_selection_velocity_stays_within_its_bound():
     lap, look, radius = 4.0, 8e-3, 0.0477
-    sharing = Sharing(0.09, 0.01, 0.01, "discrete", look)
+    sharing = SelectionRule(0.09, 0.01, 0.01, "discrete", look)
     bundle = RiverBundle((River(Trajectory.circle(radius, lap), 0.02, 0.02, 8.0),), ("circle",))
-    keeping = Keeping(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
+    keeping = HandRetention(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
     angle = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
     velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(angle), np.cos(angle)), axis=1)
     filtered = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_lifted_weights import moving_sites
 
-from controllers.curves.splines import basis, round_lap
-from controllers.haptic_map.lifting.cores import _MAX_CORE_RADIUS, core_points, draw_in
+from controllers.curves.splines import basis, periodic_interpolation
+from controllers.haptic_map.lifting.cores import _MAX_CORE_RADIUS, attract_to_core, core_points
 from tests.controllers.clips_for_maps import stylus
 from tests.controllers.haptic_map.test_lifted_map import MAP
 from tests.derivatives import central_differences
@@ -24,7 +24,7 @@ def test_cores_do_not_overlap_and_use_the_available_room(m):
     sites, shares = moving_sites(m), []
     points = core_points(sites)
     for angle in np.linspace(0.0, TURN, 500, endpoint=False):
-        centres, cores = round_lap(sites, angle), cores_at(points, angle)
+        centres, cores = periodic_interpolation(sites, angle), cores_at(points, angle)
         distance = np.linalg.norm(centres[:, None] - centres, axis=2) + np.diag(np.full(m, np.inf))
         assert (cores[:, None] + cores < distance).all()
         assert (cores <= _MAX_CORE_RADIUS + 1e-12).all()
@@ -37,7 +37,7 @@ def drawn(angle, position):
     site = np.array([[0.05 + 0.004 * np.sin(angle), 0.003 * np.cos(angle), 0.02, 0.006 + 0.001 * np.sin(2.0 * angle)]])
     slope = np.array([[0.004 * np.cos(angle), -0.003 * np.sin(angle), 0.0, 0.002 * np.cos(2.0 * angle)]])
     result, change = np.empty(2), np.empty((3, 2))
-    if not draw_in(*position, site, slope, result, change):
+    if not attract_to_core(*position, site, slope, result, change):
         return None
     return result, change, site[0]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.curves.splines import round_lap
+from controllers.curves.splines import periodic_interpolation
 from controllers.haptic_map.lifting.neighbours import (
     _MAX_PLANE_TERM,
     SITE,
@@ -110,7 +110,7 @@ def test_near_clips_are_those_whose_reach_contains_the_position():
     sites = moving_sites(40)
     weights, reach = Weights(sites), reaches(sites, R, Z)
     for angle, r, z in random_positions(1000):
-        (places_at, reach_at) = round_lap(sites, angle), round_lap(reach, angle)
+        (places_at, reach_at) = periodic_interpolation(sites, angle), periodic_interpolation(reach, angle)
         distance = np.hypot(r - places_at[:, 0], z - places_at[:, 1])
         assert set(np.flatnonzero(distance < reach_at)) == set(weights.near(angle, r, z)[0])
 

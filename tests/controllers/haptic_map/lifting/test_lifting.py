@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, arrange, is_apart, on_lap
+from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, arrange, evaluate_sites, is_apart
 from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
 from controllers.haptic_map.lifting.common_lap import common_lap
 from controllers.haptic_map.lifting.layouts import lattice, scaled
@@ -352,4 +352,4 @@ def test_is_apart_detects_curves_that_come_too_close():
     assert is_apart(task, controls)
     controls[10:20, 1, 0] = 0.035
     assert not is_apart(task, controls)
-    assert on_lap(controls)[0].shape == (SAMPLES, 2, 2)
+    assert evaluate_sites(controls)[0].shape == (SAMPLES, 2, 2)

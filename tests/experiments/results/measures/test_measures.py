@@ -134,7 +134,7 @@ def test_measures_do_not_depend_on_block_size(block: int, tmp_path: Path, monkey
 def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     with recording_of(tmp_path / "run.h5", np.zeros(N // EVERY)) as recording:
         parts = [
-            measures.measured(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
+            measures.measure_span(recording, lambda points, *_: np.tile(rest_pose(), (len(points), 1)), span)
             for span in ((0.0, 1.7003), (1.7003, 2.2), (2.2, np.inf))
         ]
     paths = [path for path, *_ in parts]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from experiments.cli import main, parsed
+from experiments.cli import main, parse_command
 
 
 def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> None:
@@ -15,4 +15,4 @@ def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> Non
     config = load_config(out / "config.json")
     assert config.user.pushes
     assert resolved(config) == config
-    assert parsed(["run", "--config", str(out / "config.json")])
+    assert parse_command(["run", "--config", str(out / "config.json")])

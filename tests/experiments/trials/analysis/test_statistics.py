@@ -6,7 +6,7 @@ import pytest
 from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
-from experiments.trials.design.study_config import study_from
+from experiments.trials.design.study_config import parse_study
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("statsmodels")
@@ -90,7 +90,7 @@ def test_effect_sizes_match_published_formulas() -> None:
 def test_failed_trials_are_excluded_and_reported() -> None:
     table = frame(-1.0)
     table.loc[0, ["state", "tracking_error"]] = ["failed", np.nan]
-    study = study_from(
+    study = parse_study(
         {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}, "map": {"a": {}, "b": {}}}, "cost": "effort"},
         "",
     )
@@ -106,7 +106,7 @@ def test_interval_without_zero_is_reported_with_corrected_p() -> None:
         "effort", "stiffness", "600", "50", 6, 0.4, 0.6, -0.2, -0.304, -0.188, -0.2, -0.2, -0.2, -0.3, -0.1, 0.01,
         0.057, -1.0, 6,
     )  # fmt: skip
-    study = study_from({"name": "s", "factors": {"stiffness": [50, 600]}, "cost": "effort"}, "")
+    study = parse_study({"name": "s", "factors": {"stiffness": [50, 600]}, "cost": "effort"}, "")
     sentence = three_sentences(study, Statistics((contrast,), {}, ()), frame(-1.0), 0)[2]
     assert "no difference shown between 600 and 50" in sentence
     assert "-0.304 to -0.188 N² s; p = 0.057 corrected after Holm)" in sentence
@@ -121,7 +121,7 @@ def test_unknown_effects_are_reported_with_their_reason() -> None:
         "sparc": "no trial has it",
     }
     for cost, reason in reasons.items():
-        study = study_from(
+        study = parse_study(
             {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}}, "cost": cost, "users": {"number": 1}}, ""
         )
         found = statistics(table, FACTORS, (), ["effort", "sparc"], 1)

@@ -7,22 +7,22 @@ from pathlib import Path
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.trials.design.design import balanced_rows, conditions, meetings
+from experiments.trials.design.design import balanced_latin_square, conditions, design_trials
 from experiments.trials.design.errors import StudyError
-from experiments.trials.design.plan import file_digest, planned
-from experiments.trials.design.study_config import read_toml, study_from
+from experiments.trials.design.plan import file_digest, plan_trials
+from experiments.trials.design.study_config import parse_study, read_toml
 from experiments.trials.study import Study
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[4] / "examples/studies").glob("*.toml"))
 
 
 def study(**values: object):
-    return study_from({"name": "s", "factors": {"stiffness": [100, 300]}} | values, "study")
+    return parse_study({"name": "s", "factors": {"stiffness": [100, 300]}} | values, "study")
 
 
 @pytest.mark.parametrize("n", range(2, 9))
 def test_order_is_balanced_in_positions_and_sequences(n: int) -> None:
-    rows = balanced_rows(n)
+    rows = balanced_latin_square(n)
     places = Counter((place, condition) for row in rows for place, condition in enumerate(row))
     follows = Counter(pair for row in rows for pair in pairwise(row))
     assert set(places.values()) == {len(rows) // n}
@@ -33,7 +33,7 @@ def test_order_is_balanced_in_positions_and_sequences(n: int) -> None:
 
 def test_within_users_every_user_meets_every_condition() -> None:
     design = study(factors={"stiffness": [1, 2, 3], "damping": [4, 5]}, repetitions=2, users={"number": 7})
-    met = meetings(design)
+    met = design_trials(design)
     assert len(conditions(design)) == 6
     assert set(Counter((m.user, m.number) for m in met).values()) == {2}
     assert all(sorted(m.position for m in met if m.user == user) == list(range(12)) for user in range(7))
@@ -41,20 +41,22 @@ def test_within_users_every_user_meets_every_condition() -> None:
 
 def test_between_users_groups_are_equal_with_one_level_each() -> None:
     design = study(factors={"stiffness": [1, 2], "damping": [4, 5, 6]}, between=["damping"], users={"number": 9})
-    levels = {user: {m.condition.levels["damping"] for m in meetings(design) if m.user == user} for user in range(9)}
+    levels = {
+        user: {m.condition.levels["damping"] for m in design_trials(design) if m.user == user} for user in range(9)
+    }
     assert all(len(met) == 1 for met in levels.values())
     assert set(Counter(next(iter(met)) for met in levels.values()).values()) == {3}
 
 
 def test_more_users_keep_the_trials_of_earlier_ones() -> None:
-    few, many = (planned(study(users={"number": number})) for number in (3, 5))
+    few, many = (plan_trials(study(users={"number": number})) for number in (3, 5))
     assert [trial.key for trial in few] == [trial.key for trial in many[: len(few)]]
     assert len({trial.key for trial in many}) == len(many)
 
 
 def test_people_lead_in_lead_mode() -> None:
     design = study(factors={"leash": [0.05, 0.1]}, run={"mode": "lead", "figure": "kinematic"})
-    assert {trial.config.user.does for trial in planned(design)} == {"lead"}
+    assert {trial.config.user.does for trial in plan_trials(design)} == {"lead"}
 
 
 def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
@@ -62,7 +64,7 @@ def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
     for content in ("{}", '{"identified": {}}'):
         file.write_text(content, encoding="utf-8")
         file_digest.cache_clear()
-        keys.add(planned(study(run={"device_file": str(file)}))[0].key)
+        keys.add(plan_trials(study(run={"device_file": str(file)}))[0].key)
     assert len(keys) == 2
 
 
@@ -92,7 +94,7 @@ def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], message: str) -> None:
     with pytest.raises(StudyError, match=message) as raised:
-        planned(study(**values))
+        plan_trials(study(**values))
     assert "\n" not in str(raised.value)
 
 
@@ -138,7 +140,7 @@ def test_unavailable_measure_is_refused(values: dict[str, object], message: str)
 
 @pytest.mark.parametrize("path", [p for p in EXAMPLES if "space" not in p.read_text()], ids=lambda path: path.stem)
 def test_example_studies_can_be_planned(path: Path) -> None:
-    assert planned(study_from(read_toml(path, "a study"), str(path)))
+    assert plan_trials(parse_study(read_toml(path, "a study"), str(path)))
 
 
 def test_invalid_toml_is_refused_with_its_line(tmp_path: Path) -> None:

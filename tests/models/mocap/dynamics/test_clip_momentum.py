@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from models.humanoid.skeleton import DEFAULT_MASS, FOOT_CONTACTS, figure_model, rest_pose
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.dynamics.moved_legs import leg_lines, with_moved_body
+from models.mocap.dynamics.moved_legs import displaced_with_planted_feet, hip_to_ankle
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 
@@ -90,7 +90,7 @@ def test_planted_foot_keeps_its_pose_when_the_body_is_moved(name):
     planted = np.tile([1.0, 0.0], (len(poses), 1))
     (before, turned), (after, turned_after) = (
         mujoco_points_and_rotations(poses),
-        mujoco_points_and_rotations(with_moved_body(poses, shift, planted)),
+        mujoco_points_and_rotations(displaced_with_planted_feet(poses, shift, planted)),
     )
     assert after[:, :4] == pytest.approx(before[:, :4], abs=1e-9)
     assert after[:, 4:] == pytest.approx(before[:, 4:] + shift[:, None], abs=1e-9)
@@ -99,13 +99,13 @@ def test_planted_foot_keeps_its_pose_when_the_body_is_moved(name):
 
 def test_zero_displacement_of_the_body_keeps_the_pose():
     poses = embedded("backflip").poses[::9]
-    same = with_moved_body(poses, np.zeros((len(poses), 3)), np.ones((len(poses), 2)))
+    same = displaced_with_planted_feet(poses, np.zeros((len(poses), 3)), np.ones((len(poses), 2)))
     assert same == pytest.approx(poses, abs=1e-12)
 
 
 def test_leg_straightens_towards_an_unreachable_planted_foot():
     poses = np.tile(rest_pose(), (2, 1))
-    moved = with_moved_body(poses, np.array([[0.0, 0.0, 0.3]] * 2), np.ones((2, 2)))
-    lines, length = leg_lines(moved)
+    moved = displaced_with_planted_feet(poses, np.array([[0.0, 0.0, 0.3]] * 2), np.ones((2, 2)))
+    lines, length = hip_to_ankle(moved)
     assert np.linalg.norm(lines, axis=2) == pytest.approx(np.full((2, 2), length), rel=1e-3)
     assert lines[:, :, 2] == pytest.approx(np.full((2, 2), -length), rel=1e-2)

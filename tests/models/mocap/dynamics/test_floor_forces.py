@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from models.humanoid.skeleton import figure_model
-from models.mocap.dynamics.floor_forces import EDGES, WITH_HANDS, Demand, Floor
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, RequiredWrench
 from models.mocap.library import embedded
 
 
@@ -19,10 +19,10 @@ def states() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_batched_demand_of_repeated_poses_equals_that_of_single_states(
     states: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
-    floor = Floor(spheres=WITH_HANDS)
+    floor = Floor(spheres=ALL_CONTACTS)
     batched = floor.demand(*states)
     single = [floor.demand(*(part[k : k + 1] for part in states)) for k in range(len(states[0]))]
-    for name in Demand._fields:
+    for name in RequiredWrench._fields:
         np.testing.assert_array_equal(getattr(batched, name), np.concatenate([getattr(d, name) for d in single]))
 
 
@@ -30,8 +30,8 @@ def test_joint_torques_under_contact_forces_match_mujoco_jacobians(
     states: tuple[np.ndarray, np.ndarray, np.ndarray],
 ) -> None:
     model = figure_model()
-    data, spheres = mujoco.MjData(model), [model.geom(name).id for name in WITH_HANDS]
-    demand = Floor(spheres=WITH_HANDS).demand(*states)
+    data, spheres = mujoco.MjData(model), [model.geom(name).id for name in ALL_CONTACTS]
+    demand = Floor(spheres=ALL_CONTACTS).demand(*states)
     grip = 100.0 * np.random.default_rng(1).random((len(states[0]), 40))
     torque = demand.torque_on(grip)
     for k in range(0, len(grip), 7):

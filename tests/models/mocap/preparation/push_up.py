@@ -5,11 +5,11 @@ from scipy.optimize import brentq
 
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, JOINTS, N_TANGENT
 from models.mocap.dynamics.coordinates import poses
-from models.mocap.dynamics.floor_forces import WITH_HANDS
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import contact_points
 
-PALMS = slice(len(FOOT_CONTACTS), len(WITH_HANDS))
+PALMS = slice(len(FOOT_CONTACTS), len(ALL_CONTACTS))
 
 
 def propped(shoulders: float) -> np.ndarray:
@@ -21,11 +21,11 @@ def propped(shoulders: float) -> np.ndarray:
 
     def gap(pitch: float) -> float:
         u[4] = pitch
-        heights = contact_points(poses(u)[None], WITH_HANDS)[0, :, 2]
+        heights = contact_points(poses(u)[None], ALL_CONTACTS)[0, :, 2]
         return heights[: PALMS.start].min() - heights[PALMS].min()
 
     u[4] = brentq(gap, 1.0, 1.5)
-    u[2] = CONTACT_RADIUS - contact_points(poses(u)[None], WITH_HANDS)[0, :, 2].min()
+    u[2] = CONTACT_RADIUS - contact_points(poses(u)[None], ALL_CONTACTS)[0, :, 2].min()
     return u
 
 

@@ -5,9 +5,9 @@ from models.humanoid.skeleton import N_TANGENT
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation import feasible
-from models.mocap.preparation.change import DEGREE, Change, Normal
+from models.mocap.preparation.change import DEGREE, Change, NormalEquations
 from models.mocap.preparation.feasible import _Problem
-from models.mocap.preparation.poses import plus, resampled, smoothed
+from models.mocap.preparation.poses import add_tangents, resampled, smoothed
 from models.mocap.preparation.stances import stances
 
 
@@ -23,7 +23,7 @@ def test_pose_difference_inverts_plus():
     rng = np.random.default_rng(0)
     poses = embedded("ginga").poses[:5]
     tangents = 0.3 * rng.normal(size=(5, N_TANGENT))
-    np.testing.assert_allclose(pose_difference(poses, plus(poses, tangents)), tangents, atol=1e-12)
+    np.testing.assert_allclose(pose_difference(poses, add_tangents(poses, tangents)), tangents, atol=1e-12)
 
 
 def test_zero_change_leaves_the_motion_unchanged(change):
@@ -82,7 +82,7 @@ def test_banded_normal_equations_match_the_stacked_rows(change):
     """The banded and bordered matrix against products with the residual rows, one for each knot interval."""
     rng = np.random.default_rng(2)
     rows = [rng.normal(size=(2, (DEGREE + 1) * N_TANGENT)) for _ in range(change.intervals)]
-    normal, n = Normal(change), change.n_points * N_TANGENT
+    normal, n = NormalEquations(change), change.n_points * N_TANGENT
     for interval, row in enumerate(rows):
         normal.add(interval, row.T @ row)
     normal.band[0] += 1.0

@@ -8,7 +8,7 @@ from models.mocap.library import embedded
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.fidelity import Fidelity, fidelity
-from models.mocap.preparation.looping import Looped, looped
+from models.mocap.preparation.looping import LoopedClip, close_or_rest
 from models.mocap.preparation.poses import resampled
 
 
@@ -17,8 +17,8 @@ def walk():
     return resampled(embedded("walk"), 120.0)
 
 
-def as_one_cycle(clip: Clip) -> Looped:
-    return Looped(clip, "cycle", 0.0, clip.duration, 0.0)
+def as_one_cycle(clip: Clip) -> LoopedClip:
+    return LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0)
 
 
 def test_planar_displacement_is_no_deviation(walk):
@@ -60,7 +60,7 @@ def test_joint_with_the_largest_deviation_is_the_first_extreme(walk):
 
 def test_transitions_to_rest_of_an_open_clip_are_not_compared(walk):
     part = Clip(walk.poses[: walk.n_frames // 6], 120.0, "part")
-    opened = looped(part, "open")
+    opened = close_or_rest(part, "open")
     assert opened.start < -0.2
     result = fidelity(opened.clip, part, opened, 1.0)
     assert result.joints < 1e-7

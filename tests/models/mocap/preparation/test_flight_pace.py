@@ -6,21 +6,21 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, HAND_CONTACTS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.pace import falling, paced
+from models.mocap.preparation.pace import correct_pace, flight_acceleration
 from models.mocap.preparation.poses import contact_points
 
 
 @pytest.mark.parametrize("name", ["jump", "backflip"])
 def test_authored_flights_fall_with_gravity_and_keep_their_pace(name):
     clip = embedded(name)
-    assert falling(clip) == pytest.approx(GRAVITY, abs=0.3)
-    assert paced(clip).clip is clip
+    assert flight_acceleration(clip) == pytest.approx(GRAVITY, abs=0.3)
+    assert correct_pace(clip).clip is clip
 
 
 @pytest.mark.parametrize("rate", [1.3, 2.0])
 def test_wrong_frame_rate_is_detected_and_corrected(rate):
     clip = embedded("jump")
-    result = paced(Clip(clip.poses, rate * clip.fps, "jump"))
+    result = correct_pace(Clip(clip.poses, rate * clip.fps, "jump"))
     assert result.pace == pytest.approx(1.0 / rate, rel=0.02)
     assert result.clip.duration == pytest.approx(clip.duration, rel=0.02)
 
@@ -28,13 +28,13 @@ def test_wrong_frame_rate_is_detected_and_corrected(rate):
 def test_slow_fall_may_be_supported_and_keeps_its_pace():
     clip = embedded("jump")
     slow = Clip(clip.poses, 0.7 * clip.fps, "slow")
-    assert paced(slow).clip is slow
+    assert correct_pace(slow).clip is slow
 
 
 def test_clip_without_flight_keeps_its_pace():
     walk = embedded("walk")
     fast = Clip(walk.poses, 2.0 * walk.fps, "walk")
-    assert paced(fast) == (fast, 1.0, None)
+    assert correct_pace(fast) == (fast, 1.0, None)
 
 
 def test_handstand_is_no_flight():
@@ -43,4 +43,4 @@ def test_handstand_is_no_flight():
     # Upside down, hands on the floor.
     poses[:, 3:7] = (0.0, 1.0, 0.0, 0.0)
     poses[:, 2] -= contact_points(poses, HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
-    assert falling(Clip(poses, clip.fps, "handstand")) is None
+    assert flight_acceleration(Clip(poses, clip.fps, "handstand")) is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, soles
-from models.mocap.preparation.foot_places import place_foot, turns
+from models.mocap.preparation.foot_places import foot_turns, place_foot
 from models.mocap.preparation.stances import Stances, clearance
 
 FPS = 120.0
@@ -25,7 +25,7 @@ def turning(angle: float, pivot: int):
 
 def placed(yaw, points, load=1.0):
     standing, places = np.ones((N, 4), bool), np.full((N, 4, 3), CONTACT_RADIUS)
-    turned = turns(np.gradient(yaw) * FPS, np.full(N, load), FPS)
+    turned = foot_turns(np.gradient(yaw) * FPS, np.full(N, load), FPS)
     place_foot(points, yaw, SOLE, np.ones((N, 2), bool), turned, standing, places)
     return standing, places
 
@@ -63,7 +63,7 @@ def test_consecutive_turns_give_continuous_places():
     spheres, headings = np.concatenate((points, moved)), np.concatenate((yaw, second_yaw + yaw[-1] - second_yaw[0]))
     n = len(spheres)
     standing, places = np.ones((n, 4), bool), np.full((n, 4, 3), CONTACT_RADIUS)
-    turned = turns(np.gradient(headings) * FPS, np.ones(n), FPS)
+    turned = foot_turns(np.gradient(headings) * FPS, np.ones(n), FPS)
     assert len(turned) == 2
     place_foot(spheres, headings, SOLE, np.ones((n, 2), bool), turned, standing, places)
     np.testing.assert_allclose(places[standing], spheres[standing], atol=0.02)

@@ -14,13 +14,13 @@ from models.humanoid.skeleton import (
     rest_pose,
 )
 from models.mocap.dynamics.coordinates import poses as pose_of
-from models.mocap.dynamics.floor_forces import EDGES, WITH_HANDS, Floor, residual
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, residual
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import feasible
 from models.mocap.preparation.change import DEGREE, Change
-from models.mocap.preparation.feasible import _Problem, borne
-from models.mocap.preparation.hand_stances import bear_longer
+from models.mocap.preparation.feasible import _Problem, contact_forces
+from models.mocap.preparation.hand_stances import extend_hand_stances
 from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import stances
 from models.mocap.preparation.well_formed import well_formed
@@ -32,7 +32,7 @@ def push_up_of_half_a_second():
     return held(61)
 
 
-def _demand(pose, spheres=WITH_HANDS):
+def _demand(pose, spheres=ALL_CONTACTS):
     floor, still = Floor(spheres=spheres), np.zeros((1, N_TANGENT))
     return floor, floor.demand(pose[None], still, still)
 
@@ -40,7 +40,7 @@ def _demand(pose, spheres=WITH_HANDS):
 def test_toes_and_palms_share_the_weight_by_their_lever_arms(held):
     """Moments about the line of the toes: the palms bear W (x_com − x_toes) / (x_palms − x_toes)."""
     floor, demand = _demand(held.poses[0])
-    standing = contact_points(held.poses[:1], WITH_HANDS)[:, :, 2] < CONTACT_RADIUS + 1e-3
+    standing = contact_points(held.poses[:1], ALL_CONTACTS)[:, :, 2] < CONTACT_RADIUS + 1e-3
     grip = floor.grip(demand, standing)
     assert standing[0].sum() == 6
     np.testing.assert_allclose(residual(demand, grip)[0, :3], 0.0, atol=1e-3 * floor.body_weight)
@@ -64,11 +64,11 @@ def test_levers_match_mujoco_jacobians():
     model, rng = figure_model(), np.random.default_rng(5)
     data, pose = mujoco.MjData(model), rest_pose()
     mujoco.mj_integratePos(model, pose, 0.5 * rng.normal(size=N_TANGENT), 1.0)
-    levers = _demand(pose)[1].levers()[0].reshape(N_TANGENT - 6, len(WITH_HANDS), 4)
+    levers = _demand(pose)[1].levers()[0].reshape(N_TANGENT - 6, len(ALL_CONTACTS), 4)
     data.qpos[:] = pose
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
-    for k, name in enumerate(WITH_HANDS):
+    for k, name in enumerate(ALL_CONTACTS):
         geom, jacobian = model.geom(name).id, np.zeros((3, N_TANGENT))
         below = data.geom_xpos[geom] - (0.0, 0.0, CONTACT_RADIUS)
         mujoco.mj_jac(model, data, jacobian, None, below, int(model.geom_bodyid[geom]))
@@ -79,7 +79,7 @@ def test_push_up_has_toes_and_palms_in_its_contact_schedule(held):
     schedule = stances(held, held)
     assert schedule.hands.all()
     np.testing.assert_allclose(schedule.places[:, PALMS, 2], CONTACT_RADIUS)
-    support = borne(held, schedule)
+    support = contact_forces(held, schedule)
     assert support.residual < 2e-3
     assert support.loads.sum(axis=1) == pytest.approx(1.0, abs=5e-3)
     assert well_formed(held, ()).residual < 2e-3
@@ -109,7 +109,7 @@ def test_hands_near_the_floor_bear_no_load_in_a_squat_on_the_feet():
     for joint, angle in bends.items():
         u[6 + 3 * JOINTS.index(joint) + 1] = np.deg2rad(angle)
     u[2] = CONTACT_RADIUS - contact_points(pose_of(u)[None], FOOT_CONTACTS)[0, :, 2].min()
-    heights = contact_points(pose_of(u)[None], WITH_HANDS)[0, :, 2] - CONTACT_RADIUS
+    heights = contact_points(pose_of(u)[None], ALL_CONTACTS)[0, :, 2] - CONTACT_RADIUS
     np.testing.assert_allclose(heights[: PALMS.start], 0.0, atol=1e-9)
     np.testing.assert_allclose(heights[PALMS], 0.083, atol=1e-3)
     squat = Clip(np.tile(pose_of(u), (61, 1)), 120.0, "squat")
@@ -128,7 +128,7 @@ def test_hand_stance_is_extended_where_nothing_else_bears_load():
     hands[:10, 0] = hands[30:, 1] = True
     palms[17:, 0, 2] += 0.2
     palms[:25, 1, 0] = 0.2
-    bear_longer(palms, hands, 10, 30, 0.15)
+    extend_hand_stances(palms, hands, 10, 30, 0.15)
     np.testing.assert_array_equal(np.flatnonzero(hands[:, 0]), np.arange(17))
     np.testing.assert_array_equal(np.flatnonzero(hands[:, 1]), np.arange(25, 40))
 

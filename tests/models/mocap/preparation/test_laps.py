@@ -8,14 +8,14 @@ import pytest
 from models.humanoid.skeleton import rest_pose
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.laps import lap_of
+from models.mocap.preparation.laps import best_lap
 
 MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
 
 
 def test_closed_clip_is_its_own_lap() -> None:
     walk = embedded("walk")
-    lap = lap_of(walk)
+    lap = best_lap(walk)
     assert lap.clip is walk
     assert (lap.start, lap.end, lap.gap) == (0.0, walk.duration, 0.0)
 
@@ -25,7 +25,7 @@ def test_closed_clip_is_its_own_lap() -> None:
 def test_gait_cycle_is_found_in_an_excerpt_that_starts_anywhere(name: str, cycle: int, first: int) -> None:
     clip = embedded(name)
     poses = clip.poses[first : first + cycle + 47]
-    lap = lap_of(Clip(poses, clip.fps, name))
+    lap = best_lap(Clip(poses, clip.fps, name))
     assert lap.clip.n_frames == cycle + 1
     assert lap.gap < 1e-3
     assert lap.end - lap.start == pytest.approx(cycle / clip.fps)
@@ -37,7 +37,7 @@ def test_gait_cycle_is_found_despite_noise_and_a_stop() -> None:
     poses = np.concatenate([clip.poses[:200], np.repeat(clip.poses[200:201], 90, axis=0)])
     poses[:, 7:] += 0.004 * rng.standard_normal(poses[:, 7:].shape)
     poses[:, 3:] /= np.repeat(np.linalg.norm(poses[:, 3:].reshape(len(poses), -1, 4), axis=2), 4, axis=1)
-    lap = lap_of(Clip(poses, clip.fps, "noisy"))
+    lap = best_lap(Clip(poses, clip.fps, "noisy"))
     assert abs(lap.clip.n_frames - 133) <= 2
     assert np.radians(0.5) < lap.gap < np.radians(10.0)
 
@@ -48,7 +48,7 @@ def test_clip_without_repetition_is_returned_unchanged() -> None:
     gliding[:, 0] = np.linspace(0.0, 2.0, 80)
     for poses in (still, gliding, still[:2]):
         clip = Clip(poses, 60.0, "x")
-        assert lap_of(clip).clip is clip
+        assert best_lap(clip).clip is clip
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_captured_gaits_have_laps_of_one_cycle(file: str, seconds: float, degree
     if not MOCAP.is_dir():
         pytest.skip("the motion capture data is not beside the project")
     clip = load_clip(MOCAP / file)
-    lap = lap_of(clip)
+    lap = best_lap(clip)
     assert lap.end - lap.start == pytest.approx(seconds, abs=0.03)
     assert lap.gap < np.radians(degrees)
     gaps_of_lap = pose_difference(lap.clip.displacement.moved(lap.clip.poses[0]), lap.clip.poses[-1])

@@ -13,13 +13,13 @@ from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.feasible import borne, feasible
-from models.mocap.preparation.fidelity import OTHERWISE
-from models.mocap.preparation.looping import looped, mirrored
-from models.mocap.preparation.poses import plus, resampled, sole_points
+from models.mocap.preparation.feasible import contact_forces, feasible
+from models.mocap.preparation.fidelity import MAX_JOINT_DISTANCE
+from models.mocap.preparation.looping import close_or_rest, mirrored
+from models.mocap.preparation.poses import add_tangents, resampled, sole_points
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.skate import stance_slides
-from models.mocap.preparation.stances import rested, stances
+from models.mocap.preparation.stances import stances, with_feet_at_rest
 from models.mocap.preparation.well_formed import outliers, well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
@@ -37,7 +37,7 @@ def walks():
 
 def test_lap_of_a_walk_is_found_and_closed(walks):
     walk, excerpt = walks
-    found = looped(excerpt)
+    found = close_or_rest(excerpt)
     assert found.kind == "cycle"
     assert found.clip.closes()
     # The embedded walk is two strides.
@@ -45,7 +45,7 @@ def test_lap_of_a_walk_is_found_and_closed(walks):
 
 
 def test_looped_returns_a_closed_clip_unchanged(walks):
-    assert looped(walks[0]).clip is walks[0]
+    assert close_or_rest(walks[0]).clip is walks[0]
 
 
 def test_looped_closes_a_lap_written_with_few_digits(walks):
@@ -56,7 +56,7 @@ def test_looped_closes_a_lap_written_with_few_digits(walks):
     poses[-1, 3:] /= np.repeat(np.linalg.norm(poses[-1, 3:].reshape(18, 4), axis=1), 4)
     written = Clip(poses, walk.fps, "few digits")
     assert not written.closes()
-    found = looped(written)
+    found = close_or_rest(written)
     assert (found.kind, found.clip.closes()) == ("cycle", True)
     assert np.abs(pose_difference(found.clip.poses, written.poses)).max() < 2e-4
 
@@ -72,7 +72,7 @@ def test_looped_removes_the_drift_of_a_lap_on_standing_feet():
         poses[k, :2] -= 3.0, -2.0
         poses[k] = displacement.moved(poses[k])
         poses[k, :2] += 3.0, -2.0
-    found = looped(Clip(poses, 120.0, "drifting"))
+    found = close_or_rest(Clip(poses, 120.0, "drifting"))
     assert found.kind == "cycle"
     np.testing.assert_allclose(found.clip.poses[-1], found.clip.poses[0], atol=1e-12)
     feet = sole_points(found.clip.poses)[:, :, :2]
@@ -83,7 +83,7 @@ def test_looped_removes_the_drift_of_a_lap_on_standing_feet():
 
 def test_looped_brings_a_clip_without_repetition_to_rest_at_both_ends(walks):
     part = Clip(walks[1].poses[: walks[0].n_frames // 6], 120.0, "part")
-    found = looped(part)
+    found = close_or_rest(part)
     assert found.kind == "open"
     speeds = np.abs(found.clip.velocities())
     assert max(speeds[0].max(), speeds[-1].max()) < 0.2
@@ -96,8 +96,8 @@ def test_noise_in_the_first_frame_hardly_changes_the_transition_from_rest(walks)
     offset = np.zeros((1, 57))
     offset[0, 6 + 3 * JOINTS.index("left_elbow") + 1] = np.deg2rad(8.0)
     poses = opened.poses.copy()
-    poses[0] = plus(poses[:1], offset)[0]
-    noisy, plain = (looped(clip, "open").clip for clip in (Clip(poses, opened.fps, "noisy"), opened))
+    poses[0] = add_tangents(poses[:1], offset)[0]
+    noisy, plain = (close_or_rest(clip, "open").clip for clip in (Clip(poses, opened.fps, "noisy"), opened))
     elbow = slice(6 + 3 * JOINTS.index("left_elbow"), 9 + 3 * JOINTS.index("left_elbow"))
     thrown = pose_difference(plain.poses[:1], noisy.poses[:1])[0, elbow]
     assert np.linalg.norm(thrown) < np.deg2rad(75.0)
@@ -111,9 +111,9 @@ def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
     for k in range(12):
         thrown = np.zeros((1, 57))
         thrown[0, knee + 1] = -15.0 * (12 - k) / opened.fps
-        poses[n - 1 - k] = plus(poses[n - 1 - k : n - k], -thrown)[0]
+        poses[n - 1 - k] = add_tangents(poses[n - 1 - k : n - k], -thrown)[0]
     excess = [
-        beyond_ranges(looped(Clip(poses, opened.fps, "thrown"), "open", within=within).clip.poses[n:]).max()
+        beyond_ranges(close_or_rest(Clip(poses, opened.fps, "thrown"), "open", within=within).clip.poses[n:]).max()
         for within in (False, True)
     ]
     captured_excess = max(beyond_ranges(poses).max(), 0.0)
@@ -124,7 +124,7 @@ def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
 def test_clip_that_ends_in_the_air_comes_to_rest_on_the_floor():
     jump = resampled(embedded("jump"), 120.0)
     flying = np.flatnonzero(sole_points(jump.poses)[:, :, 2].min(axis=1) > CONTACT_RADIUS + 0.05)
-    found = looped(Clip(jump.poses[: int(np.median(flying))], 120.0, "up"), "open")
+    found = close_or_rest(Clip(jump.poses[: int(np.median(flying))], 120.0, "up"), "open")
     assert sole_points(found.clip.poses[[0, -1]])[:, :, 2].min(axis=1) == pytest.approx(CONTACT_RADIUS, abs=1e-6)
 
 
@@ -144,12 +144,14 @@ def test_prepared_open_upright_motion_rests_on_both_feet(walks, tmp_path):
 def test_motion_that_ends_lying_gets_no_additional_foot_stances():
     dance = resampled(embedded("cheer"), 120.0)
     lying = Clip(dance.poses[:60] - np.eye(dance.poses.shape[1])[2] * 0.6, 120.0, "low")
-    np.testing.assert_array_equal(rested(stances(lying, lying), lying).standing, stances(lying, lying).standing)
+    np.testing.assert_array_equal(
+        with_feet_at_rest(stances(lying, lying), lying).standing, stances(lying, lying).standing
+    )
 
 
 def test_half_stride_is_continued_by_its_mirror_image(walks):
     walk, excerpt = walks
-    found = looped(Clip(excerpt.poses[: round(0.4 * walk.n_frames)], 120.0, "steps"), mirror=True)
+    found = close_or_rest(Clip(excerpt.poses[: round(0.4 * walk.n_frames)], 120.0, "steps"), mirror=True)
     assert found.kind == "half stride"
     assert found.clip.closes()
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
@@ -162,7 +164,7 @@ def test_half_stride_is_continued_by_its_mirror_image(walks):
 def test_mirror_option_without_a_half_stride_is_refused(walks):
     standing = Clip(np.repeat(embedded("cheer").poses[:1], 12, axis=0), 120.0, "still")
     with pytest.raises(ModelError, match=r"--mirror.*expected a gait"):
-        looped(standing, mirror=True)
+        close_or_rest(standing, mirror=True)
 
 
 def test_lap_of_a_minute_of_walking_is_a_whole_number_of_strides(walks):
@@ -171,7 +173,7 @@ def test_lap_of_a_minute_of_walking_is_a_whole_number_of_strides(walks):
     for _ in range(27):
         rows.append(walk.displacement.moved(rows[-1]))
     minute = Clip(np.concatenate(rows), 120.0, "minute")
-    found = looped(minute)
+    found = close_or_rest(minute)
     assert minute.duration > 59.0
     assert found.kind == "cycle"
     laps = found.clip.duration / (walk.duration / 2)
@@ -190,7 +192,7 @@ def test_feet_in_the_air_bear_no_load():
 @pytest.mark.parametrize("option", ["1:9", "two", "2:1"])
 def test_invalid_loop_option_is_refused(walks, option):
     with pytest.raises(ModelError, match=r"--loop .*expected"):
-        looped(walks[1], option)
+        close_or_rest(walks[1], option)
 
 
 def test_mirroring_swaps_the_soles_and_mirroring_twice_gives_the_motion(walks):
@@ -256,7 +258,7 @@ def test_stance_slide_is_the_largest_distance_from_the_median_place():
 
 def test_mean_load_of_a_walk_is_the_body_weight(walks):
     walk = walks[0]
-    loads = borne(walk, stances(walk, walk)).loads.sum(axis=1)
+    loads = contact_forces(walk, stances(walk, walk)).loads.sum(axis=1)
     assert loads.mean() == pytest.approx(1.0, abs=0.05)
 
 
@@ -316,7 +318,7 @@ def test_preparation_makes_a_captured_cartwheel_feasible_on_feet_and_hands(mocap
 def test_preparation_of_a_captured_dance_lets_feet_turn_without_skating(mocap, tmp_path):
     outcome = prepare_file(mocap / "deepmimic/humanoid3d_dance_a.txt", tmp_path / "dance.bvh")
     assert outcome.made.near
-    assert outcome.made.fidelity.joints < OTHERWISE
+    assert outcome.made.fidelity.joints < MAX_JOINT_DISTANCE
     assert outcome.measures.skate < 0.005
     assert outcome.followed.stands
 

@@ -5,7 +5,7 @@ from models.arrays import Array
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.poses import resampled, smoothed, sole_points
-from models.mocap.preparation.root_path import on_resting_support
+from models.mocap.preparation.root_path import without_foot_sliding
 
 FPS = 120.0
 
@@ -24,7 +24,7 @@ def test_body_sliding_over_the_floor_under_load_is_held_by_its_feet():
     poses = np.repeat(_standing()[None], 130, axis=0)
     poses[:, 0] += 1.0 * _ramp(130)  # 1.2 m/s
     clip = Clip(poses, FPS, "slides")
-    held = on_resting_support(clip, smoothed(clip))
+    held = without_foot_sliding(clip, smoothed(clip))
     travel = np.ptp(sole_points(held.poses)[:, :, 0], axis=0)
     assert travel.max() < 0.15  # motion slower than the bound of a standing foot remains
     np.testing.assert_array_equal(held.poses[:, 2:], clip.poses[:, 2:])
@@ -33,4 +33,4 @@ def test_body_sliding_over_the_floor_under_load_is_held_by_its_feet():
 @pytest.mark.parametrize("name", ["walk", "run", "jump"])
 def test_clip_whose_feet_rest_under_load_keeps_its_path(name: str):
     clip = resampled(embedded(name), FPS)
-    assert on_resting_support(clip, smoothed(clip)) is clip
+    assert without_foot_sliding(clip, smoothed(clip)) is clip

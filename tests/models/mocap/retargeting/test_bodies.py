@@ -9,7 +9,7 @@ from experiments.cli import main
 from models.mocap.library import embedded, load, read_motion
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError
-from models.mocap.retargeting.bodies import bodies
+from models.mocap.retargeting.bodies import people_hips
 from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rigs import Rig, random_rig, write_rig
 
@@ -109,11 +109,11 @@ def test_one_person_on_a_random_rig_counts_as_one(tmp_path):
     clip, rng = Clip(walk.poses[::40], walk.fps / 40, "walk"), np.random.default_rng(3)
     for _ in range(60):
         write_rig(rig := random_rig(rng), clip, tmp_path / "r.bvh")
-        assert len(bodies(read_motion(tmp_path / "r.bvh"))) == 1, rig
+        assert len(people_hips(read_motion(tmp_path / "r.bvh"))) == 1, rig
 
 
 def test_captures_have_at_most_one_person(mocap):
     for path in sorted([*mocap.glob("*/*.bvh"), *mocap.glob("*_amc/*.amc")]):
-        people = bodies(read_motion(path))
+        people = people_hips(read_motion(path))
         assert len(people) <= 1, path
         assert all(len(copies) == 1 for copies in people), path

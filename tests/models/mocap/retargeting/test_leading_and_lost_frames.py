@@ -15,9 +15,9 @@ from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.body_lines import body_lines
-from models.mocap.retargeting.broken_frames import repaired
+from models.mocap.retargeting.broken_frames import repair_frames
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.leading_pose import leading_frames
+from models.mocap.retargeting.leading_pose import calibration_pose_length
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, largest_angle, write_rig
@@ -35,7 +35,9 @@ def subsampled(motion, kept):
 
 def leading_frame_count(motion, roles):
     rotations = motion.global_rotations()
-    return leading_frames(motion, roles, body_lines(motion, roles, motion.global_positions(rotations), rotations))
+    return calibration_pose_length(
+        motion, roles, body_lines(motion, roles, motion.global_positions(rotations), rotations)
+    )
 
 
 @pytest.mark.parametrize("fps", RATES)
@@ -126,7 +128,7 @@ def test_motion_that_begins_at_any_frame_keeps_its_frames(name, tmp_path):
         for first in range(0, motion.n_frames - 12 * every, max(1, motion.n_frames // 12)):
             part = subsampled(motion, slice(first, None, every))
             assert leading_frame_count(part, roles) == 0, (every, first)
-            assert repaired(part, roles)[1:] == ((), (), False, ()), (every, first)
+            assert repair_frames(part, roles)[1:] == ((), (), False, ()), (every, first)
 
 
 @pytest.mark.parametrize("name", embedded_names())
@@ -136,7 +138,7 @@ def test_motion_that_ends_at_any_frame_keeps_its_last_frame(name, tmp_path):
     roles = roles_of(motion.joints, motion.parents)
     for every in {1, round(motion.fps / 30), round(motion.fps / 20)}:
         for last in range(12 * every, motion.n_frames, max(1, motion.n_frames // 40)):
-            assert not repaired(subsampled(motion, slice(None, last, every)), roles).shortened, (every, last)
+            assert not repair_frames(subsampled(motion, slice(None, last, every)), roles).shortened, (every, last)
 
 
 def test_motion_that_starts_evenly_from_its_rest_pose_keeps_it(tmp_path):
@@ -164,7 +166,7 @@ def test_only_rest_poses_are_dropped_from_captures(mocap):
             part = subsampled(motion, slice(None, None, every))
             if part.n_frames >= 10 and (n := leading_frame_count(part, roles)):
                 dropped[path.name, every] = n
-            assert repaired(part, roles).frames == () or "16_09" in path.name
+            assert repair_frames(part, roles).frames == () or "16_09" in path.name
     assert {name for name, _ in dropped} == {"01_01.bvh", "dme_example.bvh"}
     assert set(dropped.values()) == {1}
 

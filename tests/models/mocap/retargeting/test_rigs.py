@@ -108,13 +108,13 @@ def motions():
 @pytest.fixture
 def load_calibrated(monkeypatch):
     """A function that loads a file as a CalibratedMotion."""
-    on_the_floor, seen = retarget.on_the_floor, {}
+    on_the_floor, seen = retarget.put_on_floor, {}
 
     def spy(root, segments, *more):
         seen["found"] = (root, segments)
         return on_the_floor(root, segments, *more)
 
-    monkeypatch.setattr(retarget, "on_the_floor", spy)
+    monkeypatch.setattr(retarget, "put_on_floor", spy)
 
     def read(path, hints=None):
         clip, report, _ = load(path, hints)

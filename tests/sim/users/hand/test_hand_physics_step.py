@@ -5,7 +5,7 @@ import pytest
 
 from experiments.config.words import run_config
 from experiments.setups.wiring import wire
-from models.phantom.parameters import LEAST_TIP, PREMIUM_1_5
+from models.phantom.parameters import MIN_TIP_MASS, PREMIUM_1_5
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Turn
 from sim.users.hand.arm import Arm
@@ -25,8 +25,8 @@ def growth(k: float, b: float, m: float, h: float) -> float:
     ("arm", "k", "b", "m", "most"),
     [
         (TURNING, 0.1, 2.5e-3, min(PREMIUM_1_5.gimbal_inertia), 1.5518e-3),
-        (GRABBING, 300.0, 5.0, LEAST_TIP, 9.3675e-3),
-        (TRACING, 300.0, 5.0, LEAST_TIP, 9.3675e-3),
+        (GRABBING, 300.0, 5.0, MIN_TIP_MASS, 9.3675e-3),
+        (TRACING, 300.0, 5.0, MIN_TIP_MASS, 9.3675e-3),
     ],
 )
 def test_step_is_refused_from_where_the_impedance_diverges(arm: Arm, k: float, b: float, m: float, most: float) -> None:

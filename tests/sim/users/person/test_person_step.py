@@ -8,7 +8,7 @@ from numba import njit
 
 from controllers.curves.trajectory import Trajectory
 from controllers.kernel_call import call_as_given
-from controllers.lent import lend
+from controllers.lent import by_pointer
 from sim.devices.simulated import simulated_phantom
 from sim.loop.loop import Loop
 from sim.users.intents import Own, Trace, Wish
@@ -18,16 +18,16 @@ from sim.users.person.eye import Eye, seen_place
 from sim.users.person.muscles import RECOVERY
 from sim.users.person.person import Person
 from sim.users.person.person_state import (
-    ASTRAY,
     BELIEF,
     CAPACITY,
+    DIRECTION_ERROR_OFFSET,
     FELT_FORCE,
     HAND_V,
     REFLEX,
     PersonState,
 )
 from sim.users.person.person_step import link_person
-from sim.users.person.senses import ASTRAY_TIME, VEER_TIME, go_astray
+from sim.users.person.senses import ASTRAY_TIME, VEER_TIME, advance_direction_error
 from sim.users.person.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, simulated
@@ -42,7 +42,7 @@ def _held(person: PersonState, ticks: int, first: int, p: np.ndarray, force: np.
     at_rest = np.zeros(3)
     for k in range(first, first + ticks):
         for i in range(round(PERIOD / STEP)):
-            call_as_given(person.units[0], (lend(person), k * PERIOD, STEP, i, p, at_rest, force, switch))
+            call_as_given(person.units[0], (by_pointer(person), k * PERIOD, STEP, i, p, at_rest, force, switch))
 
 
 class ClampedPerson:
@@ -95,8 +95,8 @@ def test_felt_force_has_noise_proportional_to_it() -> None:
 @njit
 def _direction_errors(person: PersonState, directions: np.ndarray) -> None:
     for k in range(len(directions)):
-        go_astray(person)
-        directions[k] = person.vectors[ASTRAY]
+        advance_direction_error(person)
+        directions[k] = person.vectors[DIRECTION_ERROR_OFFSET]
 
 
 def test_direction_error_has_the_variance_of_filtered_noise() -> None:
