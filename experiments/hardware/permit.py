@@ -112,8 +112,8 @@ def check_limits(options: RunHardware) -> None:
             )
     if options.ramp < FORCE_RAMP_TIME:
         raise SimError(
-            f"--ramp {options.ramp:g} is too quick for a hand on a real device; expected {FORCE_RAMP_TIME:g} s or more, "
-            "a reaction"
+            f"--ramp {options.ramp:g} is too quick for a hand on a real device; expected {FORCE_RAMP_TIME:g} s or "
+            "more, a reaction"
         )
 
 
