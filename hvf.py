@@ -31,8 +31,8 @@ from experiments.certify.certify_simulation import certify
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.public import circle, clips, lift, load, prepare, version
 from experiments.runs.map_objects import Composite, Cylindrical, Lifted, RobotArm
+from experiments.runs.run_options import run
 from experiments.runs.run_result import Run
-from experiments.runs.run_words import run
 from experiments.runs.simulation import Simulation, Tick, User
 from experiments.runs.sweep import Swept, sweep
 from experiments.setups.parts.pace import paced

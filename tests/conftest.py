@@ -18,7 +18,7 @@ from hypothesis import settings
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
-from sim.compilation import kept_call
+from sim.compilation import bound_call
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache
 from sim.compilation.unit_key import UnknownIngredient, UnknownName
@@ -68,7 +68,7 @@ _compile = Dispatcher.compile
 
 
 def _compile_or_load(self: Any, signature: Any) -> Any:
-    if type(self._cache) is NullCache and not is_nested() and self.py_func.__module__ != kept_call.__name__:
+    if type(self._cache) is NullCache and not is_nested() and self.py_func.__module__ != bound_call.__name__:
         self._cache = _KernelCache(self)
     return _compile(self, signature)
 

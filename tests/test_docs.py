@@ -14,7 +14,7 @@ import pytest
 
 from experiments.cli import parse_command
 from experiments.commands import NAMES
-from experiments.config.words import config_of_options
+from experiments.config.options import config_of_options
 from experiments.trials.study import Study
 from experiments.tuning.tune_config import read_tuning
 

@@ -15,8 +15,8 @@ from numba import njit
 
 from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
-from controllers.legs.footing import advance_hand, hold_stance_foot, mixing_degree
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
+from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_degree
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation

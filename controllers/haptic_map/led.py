@@ -27,8 +27,8 @@ from controllers.legs.cyclic_runs import runs
 from controllers.legs.grounded import grounded, max_swing_speed_ratio
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
-from controllers.legs.planted import with_planted_ends
 from controllers.legs.reaching import solve_reach
+from controllers.legs.skate_removal import with_planted_ends
 from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, rotate_about_vertical, rotate_in_plane, turn_of

@@ -16,8 +16,8 @@ from controllers.haptic_map.lifting.frames import CLOSES, PlacedClip, checked_an
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
 from controllers.haptic_map.map_stages import CompiledMap
-from controllers.legs.footing import fresh_footing
 from controllers.legs.limbs import Limb
+from controllers.legs.stance_hold import fresh_footing
 from controllers.motion.loops import checked_clip
 from controllers.state import Array
 

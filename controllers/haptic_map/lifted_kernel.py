@@ -23,9 +23,9 @@ from controllers.haptic_map.lifting.frames import PlacedClip, frames_at, interpo
 from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
 from controllers.haptic_map.lifting.sites import box
 from controllers.legs.floor import SOFTNESS
-from controllers.legs.footing import packed_soles
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
 from controllers.legs.limbs import N_END_CHANNELS, Limb
+from controllers.legs.stance_hold import packed_soles
 from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
 from controllers.saturation import soft_clamp

@@ -21,8 +21,8 @@ import numpy as np
 from numba import njit
 
 from controllers.easing import smooth_step
-from controllers.legs.footing import packed_soles
 from controllers.legs.limbs import CENTRE, FIRST, LIMB_SIZE, OFFSETS, Limb
+from controllers.legs.stance_hold import packed_soles
 from controllers.motion.inertialization import decaying_offset, stopping_distance
 from controllers.motion.vectors import Vector, vector_at
 from controllers.rotations import exponential, logarithm, multiply, relative, rotate

@@ -30,7 +30,7 @@ from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
 from experiments.setups.parts.clips import load_clips

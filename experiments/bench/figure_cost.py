@@ -6,7 +6,7 @@ from typing import NamedTuple, get_args
 import mujoco
 import numpy as np
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.wiring import wire
 from sim.loop.loop import make_logs
 from sim.loop.servo import run_block

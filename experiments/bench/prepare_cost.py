@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from experiments.preparation.followed import followed
+from experiments.preparation.tracking_trial import followed
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import psutil
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.wiring import wire
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop

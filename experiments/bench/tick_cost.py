@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from sim.loop.loop import make_logs

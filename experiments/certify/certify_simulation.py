@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.added_laws import rivers_with
-from controllers.certificates.loop.followed_number import NotExecutable
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.symbolic_execution import NotExecutable
 from controllers.certificates.report import Verdict, hash_of, without_laws
 from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory

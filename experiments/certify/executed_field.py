@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.certificates.loop.executed import WorstState, examine_curve, examine_random_states
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.hands_about import state_text as told_at
+from controllers.certificates.loop.hand_samples import state_text as told_at
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from controllers.errors import ParameterError
-from experiments.config.words import Options, config_of_options
+from experiments.config.options import Options, config_of_options
 from experiments.console.output import Json, say
 from experiments.console.startup import STARTED
 

@@ -13,9 +13,9 @@ from controllers.certificates.flight.tolerance import BallisticTolerance, Judgem
 from controllers.certificates.loop.hand import NO_HANDS, HandRange
 from controllers.certificates.report import Certificate, ChangedInputs
 from controllers.errors import ParameterError
+from experiments.config.options import Options, RunOptions, config_of_options, given_options
 from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
-from experiments.config.words import Options, RunOptions, config_of_options, given_options
 from experiments.console.output import Json, say
 from experiments.console.progress import working
 from models.mocap.motion.clip import Clip

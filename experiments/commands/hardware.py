@@ -5,8 +5,8 @@ from typing import Annotated
 
 import tyro
 
+from experiments.config.options import config_of_options
 from experiments.config.part import above, part
-from experiments.config.words import config_of_options
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import CalibrateHardware, IdentifyHardware, RunHardware
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
+from experiments.config.options import Options, config_of_options
 from experiments.config.part import part, whole_number
-from experiments.config.words import Options, config_of_options
 
 
 @part

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from experiments.config.words import Options, config_of_options
+from experiments.config.options import Options, config_of_options
 from experiments.console.output import Json, say
 from experiments.console.startup import STARTED
 

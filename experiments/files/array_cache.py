@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array
-from experiments.files.whole_file import atomic_file
+from experiments.files.atomic_file import atomic_file
 
 
 def cached_array(

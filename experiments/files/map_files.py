@@ -13,7 +13,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import Array
-from experiments.files.whole_file import atomic_file
+from experiments.files.atomic_file import atomic_file
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError

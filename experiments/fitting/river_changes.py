@@ -24,8 +24,8 @@ from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.feasible import Feasible, contact_forces, feasible
 from models.mocap.preparation.stances import Stances, stances
-from sim.compilation.side_by_side import run_in_workers
 from sim.compilation.sources import results_folder
+from sim.compilation.workers import run_in_workers
 from sim.reference.reference import make_reference, map_poses, reference_along
 
 _TIME_BEFORE, _TIME_AFTER = 0.7, 0.9  # [s] optimised time before and after a change

@@ -72,7 +72,7 @@ def cached_verdict(
     """
 
     def find() -> Array:
-        from experiments.preparation.followed import followed  # imported late: loads signal processing
+        from experiments.preparation.tracking_trial import followed  # imported late: loads signal processing
 
         with working("following the blend"):
             result = followed(show(), seconds, compile_units)

@@ -17,9 +17,9 @@ from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from sim.hardware.gated_servo import ROW_SIZE, columns
+from sim.hardware.process_start import parent_id
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
-from sim.hardware.undisturbed import parent_id
 from sim.reference.reference import poses_along
 from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage

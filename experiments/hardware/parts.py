@@ -10,7 +10,7 @@ from controllers.safety.gate import Gate
 from controllers.state import Array
 from experiments.config.run_config import Clock, RunConfig, phantom_of
 from experiments.files.device_files import Calibration
-from experiments.hardware.permit import check_device
+from experiments.hardware.arming_checks import check_device
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from models.world.scene import P_WH, PHANTOM, SceneConfig

@@ -18,11 +18,11 @@ from experiments.console.compiling import compiler
 from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
-from experiments.hardware.attend import attend
+from experiments.hardware.arming_checks import check_device, check_limits, check_meaning, verified
+from experiments.hardware.operator_terminal import attend
 from experiments.hardware.outcome import Outcome, holds_ticks, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
-from experiments.hardware.permit import check_device, check_limits, check_meaning, verified
 from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, claimed_and_cleared
 from experiments.setups.parts.defaults import resolved
@@ -33,10 +33,10 @@ from sim.errors import SimError
 from sim.hardware.controls import HardwareRun
 from sim.hardware.emulated import delay_in_steps, emulated_identity
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
+from sim.hardware.process_start import start_without_sigint
 from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
-from sim.hardware.undisturbed import start_without_sigint
 from sim.recording.recording import Recording
 
 

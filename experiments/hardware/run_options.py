@@ -6,8 +6,8 @@ from typing import Annotated
 import tyro
 
 from controllers.errors import ParameterError
+from experiments.config.options import Options
 from experiments.config.part import above, at_least, part
-from experiments.config.words import Options
 from experiments.console.output import Json
 
 EMULATED = "emulated"

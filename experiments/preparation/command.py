@@ -5,8 +5,8 @@ from pathlib import Path
 from controllers.checks import check_kind
 from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
-from experiments.preparation.followed import followed
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
+from experiments.preparation.tracking_trial import followed
 from models.mocap.library import check_target, writing
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared

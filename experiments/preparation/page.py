@@ -3,9 +3,9 @@
 from html import escape
 
 from experiments.files.html_page import html_page, image
-from experiments.preparation.both import both_html
 from experiments.preparation.filmstrip import filmstrip
 from experiments.preparation.prepared_file import Measured, PreparedFile, advice, changes, gaps
+from experiments.preparation.side_by_side_replay import both_html
 
 
 def page(outcome: PreparedFile, captured: Measured) -> str:

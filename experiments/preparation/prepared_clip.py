@@ -11,8 +11,8 @@ from experiments.console.progress import working
 from experiments.files.array_cache import cached_array, is_cached
 from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
-from sim.compilation.side_by_side import run_in_workers
 from sim.compilation.sources import results_folder
+from sim.compilation.workers import run_in_workers
 
 # A change of this module, or of any that it imports, invalidates the cache.
 _PREPARING_MODULE = "models.mocap.preparation.prepare"

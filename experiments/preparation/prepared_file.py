@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.flights.ballistics import ClipBallistics
-from experiments.preparation.followed import Followed
+from experiments.preparation.tracking_trial import Followed
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text

@@ -31,9 +31,9 @@ from sim.devices.device import first_reading, measure_in_motion
 from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
+from sim.reference.floor_lowering import lower_start, lower_start_unit
 from sim.reference.map_derivative import derivative_unit, map_derivative
 from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along
-from sim.reference.settling import lower_start, lower_start_unit
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.world import World

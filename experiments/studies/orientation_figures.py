@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from controllers.rotations import logarithm, multiply, rotate
 from controllers.state import Array, stylus_path
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.results.pages.figures import AXES, STYLE
 from experiments.runs.run import run

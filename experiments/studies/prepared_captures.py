@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from experiments.flights.ballistics import clip_flights
-from experiments.preparation.followed import followed
 from experiments.preparation.source_deviation import deviations
+from experiments.preparation.tracking_trial import followed
 from experiments.studies.random_sets import JUDGING, TUNING
 from models.errors import ModelError
 from models.mocap.library import embedded

@@ -22,13 +22,13 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable, off_pace, timing_clip, with_loop_first
 from experiments.fitting.similarity import motion_of
 from experiments.lifting.lift import lift_clips
-from experiments.preparation.followed import followed
 from experiments.preparation.prepared_clip import prepared_clips
+from experiments.preparation.tracking_trial import followed
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
 from models.errors import ModelError

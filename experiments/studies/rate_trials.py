@@ -19,7 +19,7 @@ from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.state import VELOCITY, Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
 from experiments.setups.parts.governor import speeds_along

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog

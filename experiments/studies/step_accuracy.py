@@ -18,8 +18,8 @@ from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
 from controllers.state import Array
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import N_POSE

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from controllers.rotations import exponential, multiply
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import JOINTS, N_POSE

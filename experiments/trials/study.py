@@ -10,13 +10,13 @@ from typing import Any
 from rich.console import Console
 
 from controllers.checks import check_field_types, check_kind
-from experiments.certify.kept_stability import cached_stability
+from experiments.certify.cached_stability import cached_stability
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_json
 from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
-from experiments.trials.analysis.tidy import TABLE_CSV, TABLE_PARQUET, trial_table, write_table
+from experiments.trials.analysis.trial_table import TABLE_CSV, TABLE_PARQUET, trial_table, write_table
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import Trial, code_hash, plan_trials
 from experiments.trials.design.study_config import StudyConfig, parse_study, read_toml

@@ -11,8 +11,8 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness
 from controllers.errors import ControllerError
 from controllers.state import Array
+from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.certify.certify import certified_rivers
-from experiments.certify.kept_stability import Stability, cached_stability
 from experiments.config.run_config import RunConfig
 from experiments.trials.analysis.statistics import RESAMPLES
 from experiments.tuning.panel import Panel, panel_runs

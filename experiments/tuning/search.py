@@ -7,7 +7,7 @@ import numpy as np
 import optuna
 from optuna.trial import TrialState
 
-from experiments.certify.kept_stability import Stability, cached_stability
+from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.samplers import MAX_PROPOSALS_RATIO, RANDOM_STARTUP_COUNT, sampler_of
 from experiments.tuning.tune_config import TuneConfig

@@ -9,9 +9,9 @@ from pydantic import Field
 
 from controllers.errors import ParameterError
 from experiments.config.keywords import to_keywords
+from experiments.config.options import run_config
 from experiments.config.part import above, at_least, from_dict, part, whole_number
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
 from experiments.trials.design.study_config import MAX_TRIAL_DURATION, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from sim.compilation.side_by_side import run_in_workers
 from sim.compilation.unit_key import reached_functions
 from sim.compilation.units import Unit, unit_function
+from sim.compilation.workers import run_in_workers
 
 
 def missing_units(units: Sequence[Unit]) -> tuple[Unit, ...]:

@@ -15,9 +15,9 @@ import numpy as np
 from controllers.safety.faults import Fault, first_not_finite
 from controllers.state import Array, IntArray
 from models.phantom.kinematics import vector_to_device_frame, vector_to_hand_frame
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA

@@ -18,8 +18,8 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
+from sim.compilation.bound_call import BoundCall, keep_arguments
 from sim.compilation.c_function import address_of
-from sim.compilation.kept_call import BoundCall, keep_arguments
 from sim.compilation.memory_access import items
 from sim.compilation.python_clock import clock_for_c
 from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry

@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
-from sim.compilation.kept_call import BoundCall
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol
 from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.state import Array, IntArray
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 
 Bytes = npt.NDArray[np.uint8]

@@ -18,6 +18,7 @@ from controllers.safety.faults import Fault
 from controllers.state import Array
 from sim.errors import SimError
 from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
+from sim.hardware.process_start import start_without_sigint
 from sim.hardware.recorder_process import (
     RECORDER_APART,
     RECORDER_DROPPED,
@@ -44,7 +45,6 @@ from sim.hardware.servo_process import (
     serve,
 )
 from sim.hardware.shared import Ring, SharedNumbers
-from sim.hardware.undisturbed import start_without_sigint
 
 SERVO_TIMEOUT = 0.2
 """Time without a tick after which the servo counts as dead [s]."""

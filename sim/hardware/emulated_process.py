@@ -18,16 +18,16 @@ import numpy as np
 
 from controllers.safety.faults import Fault
 from controllers.state import Array
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, make_telemetry, note_arrival
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
 from sim.hardware.packets import CLOSED, NOTHING, monotonic, receive, transmit, wait_for_packet
+from sim.hardware.process_start import parent_id
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
-from sim.hardware.undisturbed import parent_id
 
 WATCHDOG = 0.02
 """Time without a command after which the device switches its motors off [s]: twenty periods at 1 kHz."""

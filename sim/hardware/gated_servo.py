@@ -8,7 +8,7 @@ from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
 from controllers.state import HAND_TIME, Array
-from sim.compilation.kept_call import BoundCall
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import JITTER, LOST, REFUSED, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange

@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from models.world.scene import SceneConfig
 from sim.hardware.gated_servo import CHANNELS, ROW_SIZE, columns
+from sim.hardware.process_start import parent_id
 from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
-from sim.hardware.undisturbed import parent_id
 from sim.recording.recorder import DiskFull, Group, Recorder
 from sim.recording.recording import RecordingError
 

@@ -23,17 +23,17 @@ from controllers.safety.arming import NO_REQUEST
 from controllers.safety.faults import Fault
 from controllers.state import Array, IntArray
 from models.errors import ModelError
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.compilation.sequence_lock import read_whole, write_whole
 from sim.devices.driver import LOST, REFUSED, DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.duration_histogram import DurationHistogram, Quantiles, add_duration
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
+from sim.hardware.process_start import parent_id
 from sim.hardware.realtime import become_realtime, wait_until
 from sim.hardware.shared import Ring, SharedNumbers, append_row
-from sim.hardware.undisturbed import parent_id
 
 ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end

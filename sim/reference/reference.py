@@ -163,7 +163,7 @@ def make_reference(
         Legs that step during a transition (`packed_steppers`); without them the feet slide.
     clip_seconds : float
         Duration of the clips [s] if a figure that is held in flight is to be lowered to the floor
-        (`sim.reference.settling`); 0 if not.
+        (`sim.reference.floor_lowering`); 0 if not.
 
     Raises
     ------

@@ -40,7 +40,7 @@ class CompiledReference(NamedTuple):
         Transition from clip to clip, where each river plays its own clip.
     clip_seconds : float
         Duration of the clips [s] if a figure that is held in flight is lowered to the floor
-        (`sim.reference.settling`); 0 if not.
+        (`sim.reference.floor_lowering`); 0 if not.
     settled : Array
         Share s of that lowering, with its first and second derivative, shape (3,).
     scratch_memory, scratch_x : Array

@@ -20,6 +20,7 @@ from controllers.haptic_map.river_memory import (
 )
 from controllers.state import Array
 from sim.compilation.native import mj_differentiate_pos
+from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
 from sim.reference.reference_state import (
     CompiledReference,
     apply_transition,
@@ -28,7 +29,6 @@ from sim.reference.reference_state import (
     follow_trail,
 )
 from sim.reference.river_changes import begin_precomputed_change, change_river, may_change, stop, switch_timing_curve
-from sim.reference.settling import approach, lower_to_floor, lowering_goal
 from sim.reference.stylus_filter import smooth_hand, smooth_turn
 from sim.reference.transition import dwell_complete
 

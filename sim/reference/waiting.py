@@ -7,7 +7,7 @@ waits until the figure stands and the new motion has no flight within the transi
 from numba import njit
 
 from controllers.state import Array
-from sim.reference.settling import clearance
+from sim.reference.floor_lowering import clearance
 from sim.reference.transition import DWELL_TIME, Transition
 
 _STANDING_CLEARANCE = 0.01  # [m] clearance of the feet below which the figure stands

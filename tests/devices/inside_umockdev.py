@@ -14,7 +14,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.safety.faults import Fault
 from experiments.cli import main
 from experiments.files.device_files import calibration_from, read_device_file
-from experiments.hardware.permit import check_device
+from experiments.hardware.arming_checks import check_device
 from sim.devices.driver import READ, ROUND_TRIP, DriverFault
 from sim.devices.hardware_list import hid_backend, list_devices, open_device
 from sim.errors import SimError

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import hvf
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from sim.loop.channels import groups, record_into
 from sim.recording.recorder import Recorder
 from tests.loop_with_law import loop_with

@@ -13,7 +13,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 

@@ -11,7 +11,7 @@ import pytest
 
 from controllers.fields.algebra.program import evaluate
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
 from sim.users.hand.arm import hand_force

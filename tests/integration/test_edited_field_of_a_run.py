@@ -6,7 +6,7 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from sim.users.hand.actions import Push
 from tests.loop_with_law import loop_with
 

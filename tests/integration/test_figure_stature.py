@@ -8,7 +8,7 @@ import pytest
 
 from controllers.state import Array
 from experiments.cli import main
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.lead import walker_argument
 from experiments.setups.parts.led_figure import led_map
 from experiments.setups.wiring import wire

@@ -7,7 +7,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.fields.own.own_law import law
 from controllers.fields.own.python_law import PythonLaw
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from sim.errors import SimError
 from sim.loop.loop import Loop
 from tests.loop_with_law import loop_with

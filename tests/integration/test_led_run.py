@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.runs.run import run
 from experiments.setups.modes import lead
 from experiments.setups.parts import leading_hand

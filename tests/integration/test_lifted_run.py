@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.map_files import load_figure_map
 from experiments.runs.run import run
 from sim.recording.recording import Recording

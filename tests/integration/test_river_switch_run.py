@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.runs.run import run
 from models.mocap.motion.clip import pose_difference
 from sim.recording.recording import Recording

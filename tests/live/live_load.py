@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from tests.live.browser import ARGUMENTS, CHROMIUM, ServedPage, drag, new_tab, on_screen
 from tests.live.watcher import sent_and_drawn
 

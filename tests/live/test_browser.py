@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live.cap_hand import CapHand
 from experiments.live.gate import Gate
 from experiments.live.panels.hand_keys import STEP

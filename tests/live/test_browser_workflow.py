@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live import driver
 from experiments.live.session.take_mix import FPS, TakeData
 from sim.recording.recording import Recording

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh

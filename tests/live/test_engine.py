@@ -7,7 +7,7 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import TRACE_SIZE
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live.session.engine import MAX_HAND_FORCE, Drag, Engine
 from experiments.live.session.engine_process import slice_points
 from experiments.live.session.gains import gains_of, with_gain

@@ -5,7 +5,7 @@ import pytest
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from experiments.certify.certify import certified_rivers
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live.panels.gains_panel import verdict_html
 from experiments.live.session.gain_verdict import GainVerdicts
 from experiments.setups.certified_law import governor_drag

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from controllers.errors import ParameterError
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.live.panels import gains_panel
 from experiments.live.panels.gains_panel import GainsPanel
 from experiments.live.session.gains import with_gain

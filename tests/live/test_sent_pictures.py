@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from tests.live.browser import ServedPage
 from tests.live.watcher import sent_and_drawn, start_watcher
 

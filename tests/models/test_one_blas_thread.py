@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from controllers.haptic_map.lifting.room import Room
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.lifting.lift import lift_clips
 from experiments.setups.wiring import wire
 from models.errors import ModelError

@@ -21,8 +21,8 @@ import casadi
 import numpy as np
 from scipy.optimize import linprog
 
-from controllers.certificates.loop.followed_number import Condition
 from controllers.certificates.loop.law_cases import Case, Cases
+from controllers.certificates.loop.symbolic_execution import Condition
 from controllers.errors import ControllerError
 from controllers.state import Array
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.hands_about import States, states_about
+from controllers.certificates.loop.hand_samples import States, states_about
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River

@@ -8,7 +8,8 @@ import casadi
 import numpy as np
 
 from controllers.certificates.loop.device import Symbol, vector
-from controllers.certificates.loop.followed_number import (
+from controllers.certificates.loop.hand_samples import sample_hands, state_text
+from controllers.certificates.loop.symbolic_execution import (
     Condition,
     ExecutionPath,
     NotExecutable,
@@ -16,7 +17,6 @@ from controllers.certificates.loop.followed_number import (
     SymbolicVector,
     identical,
 )
-from controllers.certificates.loop.hands_about import sample_hands, state_text
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.program import evaluate

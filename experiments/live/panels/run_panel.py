@@ -7,9 +7,9 @@ import viser
 from controllers.errors import ParameterError
 from experiments.config.maps import MAPS, Led, MapFile, RobotArm
 from experiments.config.modes import MODES
+from experiments.config.options import run_config
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import Built

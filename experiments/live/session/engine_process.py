@@ -44,7 +44,7 @@ from models.errors import ModelError
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
 from sim.errors import SimError
-from sim.hardware.undisturbed import parent_id
+from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 

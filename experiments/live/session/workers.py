@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from models.errors import ModelError
-from sim.hardware.undisturbed import parent_id, start_without_sigint
+from sim.hardware.process_start import parent_id, start_without_sigint
 
 _CHECK_INTERVAL = 0.5  # [s] between two checks that the page's process still exists
 

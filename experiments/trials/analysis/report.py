@@ -10,7 +10,7 @@ from experiments.trials.analysis.plots import effects_figure, levels_figure
 from experiments.trials.analysis.replays import replays
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
-from experiments.trials.analysis.tidy import measured_columns
+from experiments.trials.analysis.trial_table import measured_columns
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES

@@ -18,7 +18,7 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     study, found : StudyConfig, Statistics
         The study and its contrasts.
     frame : pandas.DataFrame
-        Table made by `experiments.trials.analysis.tidy.trial_table`.
+        Table made by `experiments.trials.analysis.trial_table.trial_table`.
     failed : int
         Number of failed trials.
     """

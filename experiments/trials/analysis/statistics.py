@@ -111,7 +111,7 @@ def statistics(
     Parameters
     ----------
     frame : pandas.DataFrame
-        Table made by `experiments.trials.analysis.tidy.trial_table`; failed trials are left out.
+        Table made by `experiments.trials.analysis.trial_table.trial_table`; failed trials are left out.
     factors : mapping of str to sequence of str
         Names of levels by factor, the reference first.
     between : sequence of str

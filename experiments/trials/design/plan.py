@@ -14,9 +14,9 @@ import numpy as np
 from controllers.errors import ParameterError
 from experiments.config.keywords import to_keywords
 from experiments.config.maps import MapFile
+from experiments.config.options import run_config
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
-from experiments.config.words import run_config
 from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.design import Condition, DesignTrial, conditions, design_trials
 from experiments.trials.design.errors import StudyError

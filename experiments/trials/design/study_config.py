@@ -16,7 +16,7 @@ MAX_TRIALS = 1_000_000
 MAX_TRIAL_DURATION = 86_400.0
 """Maximum duration of a trial: a day [s]."""
 Words = dict[str, Any]
-"""Parameters of a run by word, as `experiments.config.words.run_config` takes them."""
+"""Parameters of a run by word, as `experiments.config.options.run_config` takes them."""
 
 
 @part

@@ -22,9 +22,9 @@ from models.mocap.retargeting.arm_twist import with_twist_shared
 from models.mocap.retargeting.body_lines import BodyLines, body_lines
 from models.mocap.retargeting.broken_frames import repair_frames
 from models.mocap.retargeting.calibration import Calibration, calibrate
+from models.mocap.retargeting.calibration_pose import calibration_pose_length
 from models.mocap.retargeting.footing import levelled, put_on_floor
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.leading_pose import calibration_pose_length
 from models.mocap.retargeting.leg_proportions import hips_over_feet
 from models.mocap.retargeting.retarget_report import (
     RetargetReport,

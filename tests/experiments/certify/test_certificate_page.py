@@ -5,7 +5,7 @@ import pytest
 from controllers.certificates.loop.hand import NO_HANDS
 from experiments.certify.certificate_page import certificate_page
 from experiments.certify.certify import certify_into
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 from controllers.certificates.loop.hand import NO_HANDS
 from controllers.certificates.report import hash_of
 from experiments.certify.certified_field import certificate_inputs
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 
 
 def inputs_hash(**words):

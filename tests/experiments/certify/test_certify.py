@@ -23,7 +23,7 @@ from experiments.certify.certify import (
     certify_into,
 )
 from experiments.cli import main
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files import certificate_files
 from experiments.files.certificate_files import read_certificate, verify_certificate
 from experiments.setups.certified_law import uncertified_parts

@@ -8,9 +8,9 @@ import pytest
 from controllers.errors import ParameterError
 from experiments.config.keywords import option_message, to_keywords
 from experiments.config.modes import Rivers, SpeedGovernor
+from experiments.config.options import RunOptions, config_of_options, run_config, with_options
 from experiments.config.part import from_dict, to_dict, to_json
 from experiments.config.run_config import FIGURE_DEFAULTS, Figure, RunConfig
-from experiments.config.words import RunOptions, config_of_options, run_config, with_options
 from experiments.hardware.parts import served
 
 

@@ -13,7 +13,7 @@ import hvf
 from controllers.errors import ParameterError
 from experiments.cli import main
 from experiments.config.keywords import option_message, to_keywords, with_keyword_messages
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 
 CURVE = hvf.circle()
 SIM = hvf.Simulation(

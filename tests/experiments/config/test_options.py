@@ -24,6 +24,15 @@ from experiments.config.modes import (
     Stretch,
     StretchThenFollow,
 )
+from experiments.config.options import (
+    OPTIONAL_PARTS,
+    VOCABULARY,
+    RunOptions,
+    config_of_options,
+    options_of,
+    run_config,
+    with_options,
+)
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole_number
 from experiments.config.run_config import (
     Clock,
@@ -33,15 +42,6 @@ from experiments.config.run_config import (
     RunConfig,
     User,
     load_config,
-)
-from experiments.config.words import (
-    OPTIONAL_PARTS,
-    VOCABULARY,
-    RunOptions,
-    config_of_options,
-    options_of,
-    run_config,
-    with_options,
 )
 from experiments.hardware.parts import served, session_of
 from experiments.setups.wiring import wire

@@ -8,9 +8,9 @@ import pytest
 import hvf
 from controllers.errors import ParameterError
 from experiments.cli import main
+from experiments.config.options import options_of, run_config, with_options
 from experiments.config.part import from_json, to_json
 from experiments.config.run_config import RunConfig
-from experiments.config.words import options_of, run_config, with_options
 from experiments.setups.parts.hands import intent_of
 from experiments.studies.user_laws.report import lines, user_laws
 from sim.errors import SimError

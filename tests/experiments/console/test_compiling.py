@@ -8,11 +8,11 @@ import pytest
 from numba import typeof, types
 from rich.console import Console
 
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
-from sim.compilation import side_by_side
+from sim.compilation import workers
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit, unit_function
 from sim.errors import SimError
@@ -79,7 +79,7 @@ def test_unit_that_fails_to_compile_stays_missing(toys):
 def test_no_process_starts_if_no_unit_is_missing(toys, monkeypatch):
     for unit in toys:
         unit.load()
-    monkeypatch.setattr(side_by_side.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
+    monkeypatch.setattr(workers.subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
     compile_units(toys)
     assert missing_units(toys) == ()
 

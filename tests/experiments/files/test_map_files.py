@@ -12,8 +12,8 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.cli import main
+from experiments.config.options import run_config
 from experiments.config.part import to_dict
-from experiments.config.words import run_config
 from experiments.files.map_files import load_figure_map, load_map, map_digest, save_map, write_arrays
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import RECORDING

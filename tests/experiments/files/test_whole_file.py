@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.files import whole_file as whole
+from experiments.files import atomic_file as whole
+from experiments.files.atomic_file import atomic_file
 from experiments.files.device_files import save_device
 from experiments.files.map_files import write_arrays
-from experiments.files.whole_file import atomic_file
 from experiments.lifting import lift_file
 
 

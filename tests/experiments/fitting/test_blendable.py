@@ -10,7 +10,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap, natural_lap
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import keeps_pace, not_blendable, off_pace, timing_clip
 from experiments.setups.parts.governor import speeds_along

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.config.maps import Cylindrical
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model

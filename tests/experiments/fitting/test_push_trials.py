@@ -8,7 +8,7 @@ import pytest
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting import push_trials
 from experiments.fitting.similarity import arms

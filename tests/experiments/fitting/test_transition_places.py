@@ -8,7 +8,7 @@ import pytest
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import MapTransition
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.map_files import load_figure_map, save_map
 from experiments.fitting.transition_places import carried_over, places_apart
 from experiments.lifting.lift import lift_clips

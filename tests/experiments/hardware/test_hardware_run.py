@@ -22,9 +22,9 @@ from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
 from experiments.cli import main
 from experiments.config.modes import Follow
+from experiments.config.options import run_config
 from experiments.config.part import to_dict
 from experiments.config.run_config import Clock, Phantom, RunConfig
-from experiments.config.words import run_config
 from experiments.files.certificate_files import OPTIONS
 from experiments.files.device_files import (
     Calibration,
@@ -36,8 +36,8 @@ from experiments.files.device_files import (
     save_device,
 )
 from experiments.files.json_text import json_text
+from experiments.hardware.arming_checks import DEFAULT_HAND_PUSH, check_device, verified
 from experiments.hardware.calibrate import Fixture, still_readings
-from experiments.hardware.permit import DEFAULT_HAND_PUSH, check_device, verified
 from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity
@@ -121,7 +121,9 @@ def test_certificate_of_other_inputs_does_not_arm(tmp_path: Path) -> None:
 def test_unknown_or_smaller_delay_certificate_does_not_arm(tmp_path: Path, monkeypatch) -> None:
     for outcome, message in (("unknown", "stability is unknown"), ("certified", "")):
         certificate = Certificate({"stability": Verdict(outcome, "because")}, "0" * 16)
-        monkeypatch.setattr("experiments.hardware.permit.verify_certificate", lambda file, inputs, c=certificate: c)
+        monkeypatch.setattr(
+            "experiments.hardware.arming_checks.verify_certificate", lambda file, inputs, c=certificate: c
+        )
         if message:
             with pytest.raises(SimError, match=message):
                 verified(tmp_path, RunConfig(), 0.0)

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 import hvf
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record
 from experiments.setups.wiring import wire

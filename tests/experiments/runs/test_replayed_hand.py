@@ -12,9 +12,9 @@ import pytest
 
 import hvf
 from experiments.cli import main
+from experiments.config.options import options_of, run_config, with_options
 from experiments.config.part import from_dict, to_dict
 from experiments.config.run_config import RunConfig, User
-from experiments.config.words import options_of, run_config, with_options
 from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from sim.errors import SimError

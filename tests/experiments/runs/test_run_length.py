@@ -5,7 +5,7 @@ import pytest
 
 import hvf
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.wiring import wire
 from sim.loop.loop import Loop
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.certified_law import certified_laws
 
 

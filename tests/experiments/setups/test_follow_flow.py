@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controllers.state import Array
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.runs.run import run
 from sim.recording.recording import Recording
 

@@ -8,8 +8,8 @@ import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.cli import main
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.fitting.similarity import motion_at, motion_of
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.fitting import leg_choice
 from experiments.fitting.verdict import Verdict
 from experiments.setups.setups import map_parts

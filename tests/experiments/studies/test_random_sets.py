@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.preparation.followed import followed
+from experiments.preparation.tracking_trial import followed
 from experiments.studies import random_sets
 from models.mocap.library import load_clip
 from models.mocap.preparation.bounds import MAX_RESIDUAL

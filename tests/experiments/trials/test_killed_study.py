@@ -69,8 +69,8 @@ def test_missing_scheduler_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_worker_with_other_code_or_files_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from experiments.config.options import run_config
     from experiments.config.part import to_json
-    from experiments.config.words import run_config
     from experiments.trials.design.errors import StudyError
     from experiments.trials.execution.cluster import perform_on_worker
     from experiments.trials.trial.run_trial import Task

@@ -12,9 +12,9 @@ import hvf
 from controllers.certificates.loop import governed
 from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
-from experiments.certify.kept_stability import Stability, cached_stability
+from experiments.certify.cached_stability import Stability, cached_stability
+from experiments.config.options import run_config
 from experiments.config.run_config import load_config
-from experiments.config.words import run_config
 from experiments.trials.design.errors import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.threads import Threads

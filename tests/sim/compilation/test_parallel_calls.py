@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sim.compilation.side_by_side import processors, run_in_workers
+from sim.compilation.workers import processors, run_in_workers
 
 
 def test_side_effects_of_calls_remain_and_failed_calls_are_left_out(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from experiments.live.session.workers import newest
-from sim.hardware import undisturbed
+from sim.hardware import process_start
 from sim.hardware.emulated_process import SHOWN_SIZE, EmulatedEnd, host_device
 from sim.hardware.gated_servo import ROW_SIZE
 from sim.hardware.recorder_process import RECORDER_SIZE, record_rows
@@ -27,7 +27,7 @@ UNUSED_PID = 2**22 + 1  # above the largest process id
 @pytest.fixture
 def orphan(monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes this process appear as one whose parent has died."""
-    monkeypatch.setattr(undisturbed.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=UNUSED_PID))
+    monkeypatch.setattr(process_start.multiprocessing, "parent_process", lambda: SimpleNamespace(pid=UNUSED_PID))
 
 
 def test_emulated_device_ends_if_its_parent_died_while_it_started(orphan, monkeypatch) -> None:

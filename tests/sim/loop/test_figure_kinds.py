@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from experiments.config.options import run_config
 from experiments.config.part import to_dict
-from experiments.config.words import run_config
 from experiments.results.pages.report_of import write_report_of
 from experiments.runs.run import record, write_animations
 from experiments.setups.session import Session

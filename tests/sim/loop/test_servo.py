@@ -8,8 +8,8 @@ import pytest
 
 from controllers.fields.algebra.program import evaluate
 from controllers.safety.limiter import limit_force
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.hands import lap_pushes
 from experiments.setups.session import Session

@@ -10,7 +10,7 @@ from controllers.errors import CurveError
 from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.state import stylus_path
 from experiments.config.modes import Stretch
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve
 from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.pages.stretch_figure import draw_stretch

@@ -7,7 +7,7 @@ import pytest
 
 from controllers.fields.own.python_law import PythonLaw
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.hands import lap_pushes
 from experiments.setups.wiring import wire

@@ -12,7 +12,7 @@ from controllers.haptic_map.clip_change import ClipChange
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER, TRANSITION
 from controllers.state import stylus_path
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
@@ -196,7 +196,7 @@ def test_run_with_changes_compiles_nothing_in_its_own_process(run_with_changes: 
 @pytest.mark.usefixtures("run_with_changes")
 def test_figure_follows_all_changes_between_three_clips_better_than_offsets() -> None:
     from experiments.config.run_config import Figure
-    from experiments.preparation.followed import followed
+    from experiments.preparation.tracking_trial import followed
 
     haptic_map = map_parts(run_config("rivers", "rivers", clips=DISTINCT_CLIPS, lap=LAP), FIGURE).haptic_map
     map_with_offsets = with_rests(haptic_map, FIGURE)

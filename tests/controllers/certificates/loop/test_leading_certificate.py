@@ -22,7 +22,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_leading import certify_leading, leading_energy, leading_field, leading_regimes
 from experiments.certify.trial_simulation import Conditions, simulate
 from experiments.config.modes import Lead
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
 from experiments.studies.trial_onset import observed, predicted

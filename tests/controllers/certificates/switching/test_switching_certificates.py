@@ -22,7 +22,7 @@ from experiments.certify.certified_field import given_curves
 from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
 from experiments.certify.certify import certified_rivers
 from experiments.certify.crossing_simulation import simulated_course
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.rivers import default_choice, law_of
 from experiments.studies.switching_trials import straight_pair, trials
 

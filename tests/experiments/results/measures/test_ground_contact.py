@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.runs.run import run
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from sim.body.falls import UP

@@ -11,8 +11,8 @@ from controllers.walking.gait import Gait
 from experiments.cli import main
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
+from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.config.words import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
 from experiments.results.measures.lead_measures import LeadSummary, _Retrace, support_at

@@ -11,7 +11,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_SIZE
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_SWITCH, HAND_VELOCITY
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.results.measures import stretch_measures
 from experiments.results.measures.phases import EditingSummary, PerformanceSummary, PressSummary
 from experiments.results.measures.stretch_measures import press_summaries

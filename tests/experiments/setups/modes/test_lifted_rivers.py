@@ -5,7 +5,7 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.lifted_runs import default_pushes, lifted_choice, lifted_river, pushed_over
 from experiments.setups.parts.defaults import resolved, river_gains
 from models.mocap.library import embedded

@@ -11,7 +11,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.rivers import river_time
 from experiments.setups.parts.defaults import resolved, river_gains
 from experiments.setups.parts.part_types import Parts

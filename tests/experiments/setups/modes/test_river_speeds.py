@@ -5,7 +5,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from experiments.config.modes import Rivers
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.rivers import LEAST_HYSTERESIS, default_choice
 from experiments.setups.parts.hands import RIVER_PUSH, river_pushes
 from experiments.setups.wiring import wire

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip

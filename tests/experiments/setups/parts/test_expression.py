@@ -10,7 +10,7 @@ from controllers.errors import ParameterError
 from controllers.fields.follow import Follow
 from controllers.haptic_map.expressive import express
 from experiments.config.modes import OrientationMoment
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.modes.fixed_curve import with_moment
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.expression import expressive_figure

@@ -5,7 +5,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.governor import Governed, animation_along

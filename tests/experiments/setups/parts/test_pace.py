@@ -5,7 +5,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.parts import pace
 from experiments.setups.parts.pace import friction_along, inertia_along, paced
 from experiments.setups.wiring import wire

@@ -16,8 +16,8 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repair_frames
+from models.mocap.retargeting.calibration_pose import calibration_pose_length
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.leading_pose import calibration_pose_length
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, largest_angle, write_rig

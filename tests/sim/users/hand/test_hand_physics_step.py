@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.wiring import wire
 from models.phantom.parameters import MIN_TIP_MASS, PREMIUM_1_5
 from sim.errors import SimError

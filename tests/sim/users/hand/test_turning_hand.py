@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.world.scene import PHANTOM

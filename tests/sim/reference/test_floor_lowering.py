@@ -8,7 +8,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.state import stylus_path
-from experiments.config.words import run_config
+from experiments.config.options import run_config
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.setups.modes.stretch import flight_remarks
 from experiments.setups.parts.clips import load_clips
@@ -20,8 +20,8 @@ from models.world.scene import FIGURE
 from sim.loop.channels import pose_errors
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
+from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
 from sim.reference.reference import make_reference, reference_along
-from sim.reference.settling import approach, lower_to_floor, lowering_goal
 
 FIGURE_MODEL = figure_model()
 LEGS, ENDS = packed_legs(FIGURE_MODEL), np.empty((2, 7))

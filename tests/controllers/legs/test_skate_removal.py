@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.led import Led
-from controllers.legs.planted import levels, planted_ends, smooth_mask
+from controllers.legs.skate_removal import levels, planted_ends, smooth_mask
 from controllers.motion.captures import Capture
 from controllers.walking.walked_path import STEP, lay_row, path_front, straight_path
 from experiments.config.modes import Lead

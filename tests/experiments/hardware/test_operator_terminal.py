@@ -12,7 +12,7 @@ from rich.console import Console
 
 from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
-from experiments.hardware.attend import attend
+from experiments.hardware.operator_terminal import attend
 from sim.hardware.controls import RecorderStatus, RunStatus
 from sim.hardware.gated_servo import ROW_SIZE, columns
 

@@ -9,8 +9,8 @@ import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
 from controllers.state import Array
+from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
-from sim.compilation.kept_call import BoundCall
 
 
 class Parts(NamedTuple):

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.lifted import Lifted
-from controllers.legs.footing import advance_hand, fresh_footing, hold_stance_foot, mixing_degree
+from controllers.legs.stance_hold import advance_hand, fresh_footing, hold_stance_foot, mixing_degree
 from controllers.motion.lap import MEMORY
 from tests.controllers.clips_for_maps import LEG, difference, matrices, numeric_jacobian, stylus, swinging, wxyz
 from tests.controllers.haptic_map.test_lifted_map import ring

@@ -7,8 +7,8 @@ from controllers.certificates.report import Certificate, ChangedInputs
 from controllers.errors import ParameterError
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
+from experiments.config.options import given_options
 from experiments.config.run_config import RunConfig, meaningless_options
-from experiments.config.words import given_options
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
 from experiments.hardware.run_options import EMULATED, RunHardware, check_emulate

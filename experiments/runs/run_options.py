@@ -8,9 +8,9 @@ from rich.console import Console
 
 from controllers.errors import ParameterError
 from experiments.config.keywords import with_keyword_messages
+from experiments.config.options import run_config, with_options
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig, load_config
-from experiments.config.words import run_config, with_options
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
 from experiments.files.given_path import given_path

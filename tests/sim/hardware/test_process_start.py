@@ -3,7 +3,7 @@
 import multiprocessing
 import signal
 
-from sim.hardware.undisturbed import start_without_sigint
+from sim.hardware.process_start import start_without_sigint
 
 
 def report_blocked(answer) -> None:
