@@ -47,7 +47,7 @@ _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
 _PROPPED_REMARK = (
     "for {:.1f} s the body's weight is beside its feet and all else that is low: what it sits, hangs or leans on is "
-    "not in the file, and the figure has to do without"
+    "not in the file, and the figure has to do without, unless feet are missing or it plays slower than it was recorded"
 )
 _SITTING_REMARK = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "

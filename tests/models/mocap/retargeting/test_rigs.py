@@ -379,7 +379,7 @@ def test_up_axis_is_found_for_a_body_sitting_on_a_chair(motions, tmp_path):
         write_rig(Rig(up=up, zero="upright T"), posed(bend, motions.clip("cheer")), tmp_path / "r.bvh")
         report = load(tmp_path / "r.bvh").report
         assert report.up == up
-        assert any("what it sits, hangs or leans on is not in the file" in remark for remark in report.remarks)
+        assert any("what it sits, hangs or leans on" in remark for remark in report.remarks)
     write_rig(Rig(), motions.clip("squat_dance"), tmp_path / "r.bvh")
     assert not any("what it sits" in remark for remark in load(tmp_path / "r.bvh").report.remarks)
 
