@@ -89,7 +89,7 @@ class RiverClips(AnimationMap):
     a lap of its clip, and k is the lap of the round that the hand is in: it follows by continuity, and k = 0 at first.
     If no river is active, and the hand is outside the tube of the last one or too fast in it, no frame is played: the
     reference stops at a phase at which the clip can stand (`stop_clip`). The phase that is shown leads or lags behind
-    the hand's after a change of river, and while the hand is faster than its river (`river_memory.even_pace`).
+    the hand's after a change of river, and while the hand is faster than its river (`river_memory.absorb_excess_pace`).
 
     Clips are aligned in time to the first (`alignment`), so that a change keeps about the same phase of motion. A ∈
     SE(2) is the frame of the lap, stored in the memory (`lap`). When the river changes, h jumps, and the reference

@@ -85,7 +85,7 @@ def with_loop_first(first: int, loops: Sequence[Loop]) -> list[Loop]:
 
 
 def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int, timing: int) -> tuple[str, ...]:
-    """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `in_step`.
+    """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `fit_to_lap`.
 
     `laps` is the number of laps in a round, in which each loop is played once; `timing` is the index of the clip whose
     pace an advised lap keeps.

@@ -28,7 +28,7 @@ class InverseDynamics:
     with_jacobian : bool
         Whether to compute derivatives.
     contacts : tuple of str
-        The k contact spheres that may bear load: `FOOT_CONTACTS` or `WITH_HANDS`.
+        The k contact spheres that may bear load: `FOOT_CONTACTS` or `ALL_CONTACTS`.
 
     Attributes
     ----------

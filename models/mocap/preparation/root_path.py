@@ -1,6 +1,6 @@
 r"""Root path of a capture whose supporting foot slides: the body is shifted so that this foot rests.
 
-Where the centre of mass accelerates as if under load but nothing on the floor is at rest (`stances.sliding_support`),
+Where the centre of mass accelerates as if under load but nothing on the floor is at rest (`stances.sliding_spheres`),
 the captured path of the root is wrong by the motion of the supporting foot: a capture may give the rotations of limbs
 and only an estimate of the root, or the feet slid on a floor with little friction. Static friction could not bear such
 a load, and kinetic friction would brake the body by μ g. So the velocity of the root over the floor is changed by

@@ -10,7 +10,7 @@ Between the pose and the motion is one step, v₀, that the motion does not cont
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
   interpolation has spread the one step;
 - steps that fade within 0.1 s after such a jump, followed by calm: a filter has spread the jump in this case, too;
-- a first step as large as that of a broken frame at the end of a motion (`broken_frames.begins_off`).
+- a first step as large as that of a broken frame at the end of a motion (`broken_frames.first_step_jumps`).
 
 The jump is sought in the first quarter of a motion. If a pose is held without any change, as no living body stands, the
 jump is sought where that ends, however late; such a pose is recognised only by its zero rotations or straight limbs.

@@ -70,7 +70,7 @@ def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -
 
 
 def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
-    monkeypatch.setattr("experiments.hardware.run.check_there", lambda name: None)
+    monkeypatch.setattr("experiments.hardware.run.check_present", lambda name: None)
     stderr = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
     assert "expected --certificate" in stderr
 
