@@ -30,7 +30,7 @@ from controllers.state import Array, Quat
 from controllers.work_array import work_array
 
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
-# 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWINGS`) 0.4 cm and with 12 mm 0.9 cm.
+# 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.
 _SWING_HEIGHT = 0.006
 # Σ w² above which μ falls, and where it is 0: for two clips, weights 0.72 and 0.985
 _MIXED_SQUARES, _ALONE_SQUARES = 0.6, 0.97

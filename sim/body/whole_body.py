@@ -31,7 +31,7 @@ _LEVER_ARM = 0.5
 _MAX_SHARE = 3e3
 _MAX_PLANS = 4  # per control tick; each plan reduces the acceleration of joints that saturated in the previous one
 # Largest speed of the target of a figure that is set back [m/s], [rad/s]. A metre and half a turn need 1.9 m/s and
-# 5.9 rad/s, as the greatest slope of `smooth_step` is 15/8 and the return takes `RISES`.
+# 5.9 rad/s, as the greatest slope of `smooth_step` is 15/8 and the return takes `RECOVERY_TIME`.
 _MAX_RECOVERY_SPEED = 20.0
 
 

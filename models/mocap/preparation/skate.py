@@ -31,7 +31,7 @@ def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
     schedule : Stances
         Its contact schedule.
     loads : Array, shape (n, k)
-        Vertical forces on its contact points [body weights], from `feasible.borne`.
+        Vertical forces on its contact points [body weights], from `feasible.contact_forces`.
     """
     points, speeds = moving_points(clip, schedule)
     low = points[:, :, 2] - CONTACT_RADIUS < _MAX_FLOOR_HEIGHT
