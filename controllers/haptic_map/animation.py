@@ -99,7 +99,7 @@ class AnimationMap(ClipMap):
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
         self.loops: list[Loop] = fit_to_lap(loops, lap, apart)
         self.lap = lap
-        limbs = [limb.allowing(poses) for limb in limbs]
+        limbs = [limb.with_limits_for(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):

@@ -201,7 +201,7 @@ class _ClipForms(NamedTuple):
     rows: list[Array]
     stride: float
     flies: bool = False
-    grounds: bool = False
+    has_grounded_form: bool = False
     pace: float = 1.0
 
 
@@ -301,7 +301,7 @@ class Led(KernelMap):
         if capture is not None:
             channels = low_pass(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
-        limbs = [limb.allowing([channels]) for limb in limbs]
+        limbs = [limb.with_limits_for([channels]) for limb in limbs]
         rows = with_ends(channels[:, None], drift, limbs, np.ones(1))[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
         signs, clip_forms = closing_signs(rows, self._rotations), _ClipForms([rows], self.stride)
@@ -314,8 +314,8 @@ class Led(KernelMap):
                 clip_forms = _ClipForms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
             else:
                 clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
-        forms, self.stride, self.flies, self.grounds, self.pace = clip_forms
-        self.sways = self.grounds or (capture is not None and not self.flies)
+        forms, self.stride, self.flies, self.has_grounded_form, self.pace = clip_forms
+        self.sways = self.has_grounded_form or (capture is not None and not self.flies)
         lags = np.array([form[:, channels.shape[1] + 3 :: N_END_CHANNELS] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _LOWERING_RATIO * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)

@@ -111,7 +111,7 @@ class Lifted(ClipMap):
         self.transitions = checked_transitions(transitions, m)
         self.legs_of: int | None = None
         self.share = 1.0
-        limbs = [limb.allowing([clip.poses for clip in self._placed_clips]) for limb in limbs]
+        limbs = [limb.with_limits_for([clip.poses for clip in self._placed_clips]) for limb in limbs]
         params = packed_lifted(self._placed_clips, self.sites, self.margin, limbs)
         super().__init__(params, clips, names, limbs)
 

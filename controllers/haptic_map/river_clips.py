@@ -164,7 +164,7 @@ class RiverClips(AnimationMap):
         """Duration of a round of a river [s]."""
         return self.laps * self.curves[river].duration
 
-    def with_rests(self, rests: Sequence[Array]) -> "RiverClips":
+    def with_rest_phases(self, rests: Sequence[Array]) -> "RiverClips":
         """The same map with clips that stop only at given phases [s] of the round, (n,) per curve; empty: anywhere.
 
         Raises

@@ -105,7 +105,7 @@ class Limb:
         centre, limits = np.mean(self.points, axis=0), np.ravel(self.limits)
         return np.concatenate([self.joints, np.ravel(self.offsets), unit, centre, limits])
 
-    def allowing(self, clips: Sequence[Array]) -> "Limb":
+    def with_limits_for(self, clips: Sequence[Array]) -> "Limb":
         """The same limb with limits extended to include all poses of clips, each of shape (n, nq).
 
         Raises

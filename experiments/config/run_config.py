@@ -157,7 +157,7 @@ class Figure:
             if value != FIGURE_DEFAULTS[name]:
                 raise meaningless_option_error(name, f"{value:g}", body)
 
-    def become(self, kind: FigureKind, leads: bool) -> "Figure":
+    def as_kind(self, kind: FigureKind, leads: bool) -> "Figure":
         """The same figure as another kind; numbers that have no meaning for that kind get their defaults."""
         return replace(self, kind=kind, **{name: FIGURE_DEFAULTS[name] for name in meaningless_options(kind, leads)})
 

@@ -44,7 +44,7 @@ class Calibration(NamedTuple):
     serial: str
     power_up: int
 
-    def why_not(self, identity: DeviceIdentity) -> str:
+    def rejection_reason(self, identity: DeviceIdentity) -> str:
         """Why the calibration is not valid for this device now; empty if it is."""
         if (self.name, self.serial) != (identity.name, identity.serial):
             return f"is calibrated for {self.name} {self.serial}".rstrip()

@@ -37,7 +37,7 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     for clip in {clip.name: clip for clip in clips}.values():
         flight = longest_flight(clip)
         if clip.turns_over:
-            fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.least_upright)):.0f}° from upright)"
+            fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.min_pelvis_cosine)):.0f}° from upright)"
             lines.append(f"{clip.name} {fault}: no motion lies between it and others")
         elif flight > MAX_FLIGHT_TIME:
             lines.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")

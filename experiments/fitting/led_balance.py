@@ -24,7 +24,7 @@ _SWAY_PACE = 0.8  # pace at which the sway is computed, over the gait's own
 
 def led_gains(led: Led) -> FigureGains:
     """Gains of a led physical figure, by whether its gait flies, is kept on the ground, or walks."""
-    return _FLYING if led.flies else _STEPPING if led.grounds else _WALKING
+    return _FLYING if led.flies else _STEPPING if led.has_grounded_form else _WALKING
 
 
 def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:

@@ -51,4 +51,4 @@ def with_rests(clips: RiverClips, figure: mujoco.MjModel) -> RiverClips:
         # FOOT_CONTACTS begins with the four points of the left foot.
         can_rest = (distance == 0.0) & touching[:, :4].any(axis=1) & touching[:, 4:].any(axis=1)
         rests.append(phases[can_rest] if can_rest.any() else phases[[distance.argmin()]])
-    return clips.with_rests(rests)
+    return clips.with_rest_phases(rests)

@@ -193,7 +193,7 @@ def _make_passage(
         part = slice(k, k + _BLOCK)
         reference_along(reference, stylus[part], traces[part], poses[part])
         changed = k if changed is None and reference.memory[ACTIVE_RIVER] == second else changed
-        if changed is not None and reference.transition.since[0] >= reference.transition.lasts[0]:
+        if changed is not None and reference.transition.since[0] >= reference.transition.duration[0]:
             rest = slice(part.stop, part.stop + tail)
             reference_along(reference, stylus[rest], traces[rest], poses[rest])
             rows = np.arange(changed - round((_TIME_BEFORE + _CONTEXT) * FPS), rest.stop)

@@ -134,9 +134,9 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
             f"{identity.name} is not calibrated: its encoders do not know their zero; expected a --device-file that "
             "hvf hardware calibrate has written"
         )
-    if calibration is not None and calibration.why_not(identity):
+    if calibration is not None and (reason := calibration.rejection_reason(identity)):
         raise SimError(
-            f"the device file {calibration.why_not(identity)}, this is {identity.name} {identity.serial}".rstrip()
+            f"the device file {reason}, this is {identity.name} {identity.serial}".rstrip()
             + "; calibrate it with hvf hardware calibrate"
         )
     warnings: list[str] = []

@@ -33,7 +33,7 @@ def page_session(config: RunConfig, ready: Ready = lambda units: None) -> Sessio
     """Session that the page shows: with the kinematic figure, or the device alone if the figure is led; see `wire`."""
     if config.leads:
         return session_of(served(config), ready)
-    return wire(replace(config, figure=config.figure.become("kinematic", leads=False)), ready=ready)
+    return wire(replace(config, figure=config.figure.as_kind("kinematic", leads=False)), ready=ready)
 
 
 def show_status(config: RunConfig, status: SharedNumbers, recorder_status: SharedNumbers) -> None:

@@ -40,7 +40,7 @@ def served(config: RunConfig) -> RunConfig:
     if config.body == "robot":
         raise ParameterError("beside a device only figures are shown; expected another map than robot-arm")
     clock = Clock(servo_period=config.clock.servo_period, physics_step=config.clock.servo_period)
-    return replace(config, figure=config.figure.become("none", config.leads), clock=clock)
+    return replace(config, figure=config.figure.as_kind("none", config.leads), clock=clock)
 
 
 def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: float = SILENT_PERIODS) -> Session:

@@ -116,9 +116,9 @@ def changes(made: Prepared) -> tuple[str, ...]:
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
-    if made.carried > _MIN_ROOT_SHIFT:
+    if made.root_shift > _MIN_ROOT_SHIFT:
         lines.append(
-            f"carried over the floor by up to {100 * made.carried:.0f} cm, since a foot that bears the load slides"
+            f"carried over the floor by up to {100 * made.root_shift:.0f} cm, since a foot that bears the load slides"
         )
     if not made.near:
         return (*lines, "dynamics and feet as captured")

@@ -44,7 +44,9 @@ def _complete(folder: Path) -> None:
         check_files(config, recording)
         session = wire(config, clips_of(recording), compiler(Console(stderr=True)))
         seconds = len(recording.channel("ticks", "t")) * session.servo.plant.period
-        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
+        loop = Loop(
+            session.servo, session.world, python_laws=session.parts.program.python_laws, **session.intent_arguments
+        )
         times = loop.run(seconds)
     speed = SpeedSummary(times.real_time_factor, float("nan"), peak_memory_mb())
     write_summary(folder, session_summary(folder, session, speed))

@@ -154,7 +154,7 @@ def _simulate(
 
     laws = session.parts.program.python_laws
     block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
-    loop = Loop(servo, session.world, observe, block, laws, **session.asking)
+    loop = Loop(servo, session.world, observe, block, laws, **session.intent_arguments)
     first = servo.plant.period * servo.figure_ticks
     rest = first * (round(seconds / first) - 1)  # a whole number of figure updates, as many as in a single call
     with session.naming_laws():

@@ -272,7 +272,9 @@ class Simulation:
     def __iter__(self) -> Iterator[Tick]:
         """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
-        loop = Loop(session.servo, session.world, python_laws=session.parts.program.python_laws, **session.asking)
+        loop = Loop(
+            session.servo, session.world, python_laws=session.parts.program.python_laws, **session.intent_arguments
+        )
         left = available_ticks(session.servo.device)
         for _ in itertools.count() if left is None else range(left):
             with session.naming_laws():

@@ -61,7 +61,7 @@ class Session:
         return self.parts.maps.whole_map
 
     @property
-    def asking(self) -> Mapping[str, Any]:
+    def intent_arguments(self) -> Mapping[str, Any]:
         """Keyword arguments of `sim.loop.loop.Loop` for a person's intent in Python; empty if there is none."""
         user, device = self.parts.user, self.servo.device
         own = user.own if isinstance(user, Participant) else None

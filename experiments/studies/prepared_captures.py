@@ -83,7 +83,7 @@ def _source_deviations(path: Path, made: Prepared) -> tuple[str, str]:
 
 
 def _flights_text(measures: WellFormed) -> str:
-    return f"{measures.falling:.1f} ({measures.flights})" if measures.flights else "none"
+    return f"{measures.flight_error:.1f} ({measures.flights})" if measures.flights else "none"
 
 
 def _soles_text(measures: WellFormed) -> str:

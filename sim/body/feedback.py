@@ -63,7 +63,7 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
     rate = gains.root_rate
     for i in range(3):
         a[i] = 2.0 * rate * (v_r[i] - s.qvel[i]) + rate**2 * (q_r[i] - s.qpos[i])
-    limit_length(a[:3], gains.root_pull)
+    limit_length(a[:3], gains.max_root_acceleration)
     rotated[:] = a_r[:3]
     limit_length(rotated, gains.linear_limit)
     a[:3] += rotated
@@ -77,7 +77,7 @@ def wanted_acceleration(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> N
         for i in range(3):
             a[t + i] = 2.0 * rate * (rotated[i] - s.qvel[t + i]) + stiffness * error[i]
         if body == 0:
-            limit_length(a[3:6], gains.root_turn)
+            limit_length(a[3:6], gains.max_root_angular_acceleration)
         rotate_by_vector(error, a_r[t : t + 3], rotated)
         limit_length(rotated, gains.angular_limit)
         a[t : t + 3] += rotated

@@ -29,7 +29,7 @@ class FigureGains(NamedTuple):
         Joint error at which the feedback saturates [rad]: a larger error decays at a constant speed, ω/2 times this, so
         that the motors have torque left to stop the joint. Half or twice the value changes the residual of walk, run
         and jump by at most 0.1 % of weight.
-    root_pull, root_turn : float
+    max_root_acceleration, max_root_angular_acceleration : float
         Largest linear and angular acceleration that feedback may ask of the root [m/s²], [rad/s²], so that a late
         landing is absorbed. Half or twice the values leave the residual of walk, run and jump unchanged.
     linear_limit, angular_limit : float
@@ -70,8 +70,8 @@ class FigureGains(NamedTuple):
     joint_rate: float = 40.0
     root_rate: float = 40.0
     joint_reach: float = 0.15
-    root_pull: float = 30.0
-    root_turn: float = 300.0
+    max_root_acceleration: float = 30.0
+    max_root_angular_acceleration: float = 300.0
     linear_limit: float = 40.0
     angular_limit: float = 500.0
     force_bound: float = 0.5

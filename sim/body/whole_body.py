@@ -84,7 +84,7 @@ def _control_recovery(s: FigureState, q_r: Array) -> None:
         limit_length(s.fall.velocity[k : k + 3], _MAX_RECOVERY_SPEED)  # the reference may jump
     wanted_acceleration(s, s.fall.target, s.fall.velocity, s.fall.still)
     rate = s.gains.root_rate
-    for i in range(3):  # without the bound `root_pull`: the animation may have moved far away
+    for i in range(3):  # without the bound `max_root_acceleration`: the animation may have moved far away
         s.acceleration[i] = 2.0 * rate * (s.fall.velocity[i] - s.qvel[i]) + rate**2 * (s.fall.target[i] - s.qpos[i])
     s.given[:], s.share[:], s.yielding[:] = 0.0, 0.0, 0
     for plan in range(_MAX_PLANS):

@@ -190,7 +190,7 @@ def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition
     (stages, params, memory, size), (nq, nv) = compiled, sizes
     return CompiledReference(
         figure_model=0, smoothing=0.0, period=1.0, stages=stages, params=params, memory=memory,
-        size=size, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), going=np.zeros((3, 3)),
+        size=size, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), trail_motion=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=transition, clip_seconds=0.0,
         settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq),

@@ -28,7 +28,7 @@ class CompiledReference(NamedTuple):
         Smoothed position, velocity and acceleration of the hand in H, shape (3, 3).
     trail : Array
         Smoothed position one period ago, and two, shape (2, 3).
-    going : Array
+    trail_motion : Array
         Scratch: the smoothed position with velocity and acceleration by backward differences, shape (3, 3).
     orientation, turning : Array
         Smoothed orientation R_H of the stylus (wxyz), shape (4,), and ω and α in the stylus's frame, shape (2, 3).
@@ -58,7 +58,7 @@ class CompiledReference(NamedTuple):
     size: float
     hand: Array
     trail: Array
-    going: Array
+    trail_motion: Array
     orientation: Array
     turning: Array
     started: Array
@@ -117,11 +117,11 @@ def _extrapolate_stylus(reference: CompiledReference, hand: Array, sign: float) 
 
 @njit
 def follow_trail(reference: CompiledReference) -> None:
-    """Backward differences of the smoothed hand's last positions, into `going`.
+    """Backward differences of the smoothed hand's last positions, into `trail_motion`.
 
     The filter's own velocity and acceleration lag behind these when the hand is thrown.
     """
-    now, trail, going, period = reference.hand[0], reference.trail, reference.going, reference.period
+    now, trail, going, period = reference.hand[0], reference.trail, reference.trail_motion, reference.period
     for i in range(3):
         going[0, i] = now[i]
         going[1, i] = 0.5 * (3.0 * now[i] - 4.0 * trail[0, i] + trail[1, i]) / period
@@ -131,7 +131,7 @@ def follow_trail(reference: CompiledReference) -> None:
 @njit
 def apply_transition(reference: CompiledReference) -> None:
     """Apply the transition in progress to the poses now, before and after."""
-    if reference.transition.since[0] >= reference.transition.lasts[0]:
+    if reference.transition.since[0] >= reference.transition.duration[0]:
         return
     apply_transition_to_pose(reference.transition, 0.0, reference.pose)
     apply_transition_to_pose(reference.transition, -reference.period, reference.before)

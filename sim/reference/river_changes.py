@@ -53,7 +53,7 @@ def _place_clip(reference: CompiledReference, pose: Array, x: float, y: float, t
 @njit
 def _store_shown_poses(reference: CompiledReference, params: Array) -> None:
     """Store the poses that are shown now, one period before and one period after."""
-    evaluate_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.trail_motion)
     apply_transition(reference)
     shown = reference.transition.shown
     shown[0], shown[1], shown[2] = reference.pose, reference.before, reference.after
@@ -67,8 +67,8 @@ def _place_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, f
     there is none, and the horizontal distance by which the motion was moved [m].
     """
     transition, old, new = reference.transition, np.empty(7), np.empty(7)
-    _evaluate_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
-    _evaluate_ahead(reference, params, transition.lasts[0], transition.ahead[1])
+    _evaluate_ahead(reference, params, 0.5 * transition.duration[0], transition.ahead[0])
+    _evaluate_ahead(reference, params, transition.duration[0], transition.ahead[1])
     foot, row = pivot_of(transition)
     moved = 0.0
     if foot >= 0:
@@ -89,13 +89,13 @@ def _begin_transition(reference: CompiledReference, params: Array) -> None:
     """
     transition, period = reference.transition, reference.period
     shown, change = transition.shown, transition.change
-    evaluate_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.trail_motion)
     pose = reference.pose
     _place_clip(reference, pose, shown[0, 0], shown[0, 1], heading_between(pose, shown[0]))
-    evaluate_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.trail_motion)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, -1)
     set_duration(transition, 0.0, period)
-    stopping, seconds = np.zeros(3), transition.lasts[0]
+    stopping, seconds = np.zeros(3), transition.duration[0]
     for i in range(2):
         stopping[i] = stopping_distance(change[1, i], change[2, i], seconds)
     _, _, spin = rotate(pose[3], pose[4], pose[5], pose[6], change[1, 3], change[1, 4], change[1, 5])
@@ -106,9 +106,9 @@ def _begin_transition(reference: CompiledReference, params: Array) -> None:
     set_duration(transition, moved, period)
     # A longer change ends at another pose: place the motion again by where the foot stands then.
     foot, _ = _place_on_pivot(reference, params)
-    evaluate_around_in_river(reference, params, reference.going)
+    evaluate_around_in_river(reference, params, reference.trail_motion)
     note_change(transition, reference.figure_model, period, pose, reference.before, reference.after, foot)
-    _evaluate_ahead(reference, params, 0.5 * transition.lasts[0], transition.ahead[0])
+    _evaluate_ahead(reference, params, 0.5 * transition.duration[0], transition.ahead[0])
     plan_depth(transition)
     transition.since[0] = 0.0
 

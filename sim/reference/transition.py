@@ -49,7 +49,7 @@ class Transition(NamedTuple):
     ----------
     seconds : float
         Shortest blend time [s]; 0: the figure jumps.
-    lasts : Array
+    duration : Array
         Duration T of the last change [s], longer where the root has far to go, shape (1,).
     since : Array
         Time since the last change [s], infinite before the first, shape (1,).
@@ -61,7 +61,7 @@ class Transition(NamedTuple):
         Legs (`packed_steppers`), and their steps (`controllers.legs.footsteps`), shape (n, 28).
     ends : Array
         Scratch: poses of the new motion's feet, shape (n, 7).
-    rival : Array
+    candidate_river : Array
         The river that would take over, and for how long it has been active [s], shape (2,).
     shown : Array
         Scratch: the shown pose now, and one period before and after, shape (3, 75).
@@ -74,14 +74,14 @@ class Transition(NamedTuple):
     """
 
     seconds: float
-    lasts: Array
+    duration: Array
     since: Array
     depth: Array
     change: Array
     limbs: Array
     steps: Array
     ends: Array
-    rival: Array
+    candidate_river: Array
     shown: Array
     ahead: Array
     stands: Array
@@ -94,9 +94,9 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
     """A transition before its first change, for poses of nq and tangents of nv numbers; limbs are `packed_steppers`."""
     n = len(limbs)
     return Transition(
-        seconds=seconds, lasts=np.full(1, seconds), since=np.full(1, np.inf), depth=np.zeros(1),
+        seconds=seconds, duration=np.full(1, seconds), since=np.full(1, np.inf), depth=np.zeros(1),
         change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)), ends=np.zeros((n, 7)),
-        rival=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
+        candidate_river=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
         ahead=np.zeros((2, nq)), stands=np.zeros(n), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
     )  # fmt: skip
 
@@ -104,7 +104,7 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
 @njit
 def dwell_complete(transition: Transition, river: float, period: float) -> bool:
     """Whether the river that would take over (−1: none) has been active for the dwell time; call it every period."""
-    rival = transition.rival
+    rival = transition.candidate_river
     rival[1] = rival[1] + period if river == rival[0] else 0.0
     rival[0] = river
     return river >= 0.0 and rival[1] >= DWELL_TIME
@@ -119,7 +119,7 @@ def pivot_of(transition: Transition) -> tuple[int, int]:
 @njit
 def set_duration(transition: Transition, aside: float, period: float) -> None:
     """Set the duration of a change from the root's offset: vertical, as `note_change` found it, and `aside` [m]."""
-    transition.lasts[0] = transition.seconds
+    transition.duration[0] = transition.seconds
     if transition.seconds > 0.0:
         vertical_time = np.sqrt(_ACCELERATION_FACTOR * abs(transition.change[0, 2]) / _MAX_VERTICAL_ACCELERATION)
         # Bounded, since a figure in flight would keep flying, and a running one would leave both feet behind.
@@ -130,13 +130,13 @@ def set_duration(transition: Transition, aside: float, period: float) -> None:
             _MAX_PROLONGATION * transition.seconds,
             _MAX_TRAVEL / max(pace, 1e-9),
         )
-        transition.lasts[0] = max(transition.seconds, vertical_time, horizontal_time)
+        transition.duration[0] = max(transition.seconds, vertical_time, horizontal_time)
 
 
 @njit
 def _apply_offset(transition: Transition, at: float, pose: Array) -> None:
     """Write the limbs' ends `at` seconds into the change to `ends`, and add the remaining offset to the pose."""
-    lasts, ends = transition.lasts[0], transition.ends
+    lasts, ends = transition.duration[0], transition.ends
     for n in range(transition.limbs.shape[0]):
         limb_end(transition.limbs[n], pose, ends[n])
         step_end(transition.limbs[n], transition.steps[n], at, lasts, ends[n])
@@ -148,7 +148,7 @@ def _apply_offset(transition: Transition, at: float, pose: Array) -> None:
 @njit
 def apply_transition_to_pose(transition: Transition, s: float, pose: Array) -> None:
     """Turn a pose of the new motion, s seconds from now, into the shown pose: add offset, root depth and steps."""
-    since, lasts, limbs, ends = transition.since[0], transition.lasts[0], transition.limbs, transition.ends
+    since, lasts, limbs, ends = transition.since[0], transition.duration[0], transition.limbs, transition.ends
     if since >= lasts:
         return
     at = min(since + s, lasts)
@@ -166,7 +166,7 @@ def plan_depth(transition: Transition) -> None:
 
     `ahead[0]` holds the new motion's pose at that time. The root accelerates downwards by 1.14 g at most.
     """
-    limbs, ends, lasts, pose = transition.limbs, transition.ends, transition.lasts[0], transition.ahead[0]
+    limbs, ends, lasts, pose = transition.limbs, transition.ends, transition.duration[0], transition.ahead[0]
     transition.depth[0] = 0.0
     if transition.seconds == 0.0:
         return
@@ -201,6 +201,6 @@ def note_change(
         )
     if transition.seconds > 0.0:
         plan_steps(
-            transition.limbs, transition.steps, transition.shown, pose, period, transition.lasts[0], second,
+            transition.limbs, transition.steps, transition.shown, pose, period, transition.duration[0], second,
             transition.stands,
         )  # fmt: skip

@@ -92,7 +92,7 @@ def _change_clip_if_due(reference: CompiledReference, params: Array, trace: Arra
     """Begin a change to the clip of the active river, or to rest, where one is due."""
     period, river = reference.period, trace[TRACE_RIVER]
     # Rivers with blended weights may become active in turn many times a second: a change must end before the next.
-    is_complete = reference.transition.since[0] >= reference.transition.lasts[0]
+    is_complete = reference.transition.since[0] >= reference.transition.duration[0]
     has_dwelt = dwell_complete(
         reference.transition, river if is_taken_over(params, reference.memory, river) else -1.0, period
     )
@@ -106,7 +106,7 @@ def _change_clip_if_due(reference: CompiledReference, params: Array, trace: Arra
         change_river(reference, params, river, trace[TRACE_PHASE])
     else:
         rate = phase_rate(params, reference.memory, reference.scratch_memory, period)
-        if has_left_river(params, reference.memory, river, reference.going, rate):
+        if has_left_river(params, reference.memory, river, reference.trail_motion, rate):
             stop(reference, params)
 
 

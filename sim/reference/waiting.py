@@ -32,5 +32,7 @@ def is_leaping(transition: Transition, pose: Array, size: float) -> bool:
 def has_waited_enough(transition: Transition) -> bool:
     """Whether the river that would take over has waited long enough; without legs or blend time there is no wait."""
     return (
-        transition.rival[1] > DWELL_TIME + _MAX_WAIT_TIME or transition.seconds == 0.0 or transition.limbs.shape[0] == 0
+        transition.candidate_river[1] > DWELL_TIME + _MAX_WAIT_TIME
+        or transition.seconds == 0.0
+        or transition.limbs.shape[0] == 0
     )

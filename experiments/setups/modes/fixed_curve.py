@@ -38,7 +38,7 @@ class FixedField(NamedTuple):
         Stiffness [N/m] and reach [m] of each of its springs.
     notes : Notes
         Titles and labels.
-    urged : float
+    max_urged_speed : float
         Largest speed to which a governor urges the hand [m/s]; 0 without one.
     tube : float
         ε, radius of the tube in which the orientation moment acts [m].
@@ -53,7 +53,7 @@ class FixedField(NamedTuple):
     power: float
     springs: Sequence[tuple[float, float]]
     notes: Notes
-    urged: float = 0.0
+    max_urged_speed: float = 0.0
     tube: float = TUBE
     pushes: tuple[Push, ...] | None = None
     other: Trajectory | None = None
@@ -69,7 +69,7 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
     """
     user = resolved_user(config.user, maps.curve, config.seconds, pushes=field.pushes)
     drag = 0.0 if mode.governor is None else mode.governor.governor_drag
-    power, limiter = field.power + river_power(drag, field.urged), ForceLimiter(config.clock.servo_period)
+    power, limiter = field.power + river_power(drag, field.max_urged_speed), ForceLimiter(config.clock.servo_period)
     traces = user.traces
     program = with_moment(field.law.program(), mode.orientation, field.course, field.tube)
     return Parts(

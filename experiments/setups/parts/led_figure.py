@@ -97,9 +97,9 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     if not closes:
         return _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
     made = _map_and_gait(clip, legs, marks.planted[:-1], None)
-    if made[0].flies and not made[0].grounds:
+    if made[0].flies and not made[0].has_grounded_form:
         steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
-        return steps if steps[0].grounds else made
+        return steps if steps[0].has_grounded_form else made
     return made
 
 
@@ -114,7 +114,7 @@ def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Cap
     led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stands, capture)
     if not led.flies:
         support = np.maximum(support, 1)
-    speed, grounded = led.pace * led.stride / led.duration, led.grounds and not led.flies
+    speed, grounded = led.pace * led.stride / led.duration, led.has_grounded_form and not led.flies
     return led, Gait(led.stride, speed, np.roll(support, -first), led.reach, grounded)
 
 
@@ -159,9 +159,9 @@ def stances(marks: Contacts, fps: float) -> Mask:
 
 def gait_remark(name: str, led: Led, figure: FigureKind) -> tuple[str, ...]:
     """Remark on a clip with flights: a body in the air falls with g, whatever the pace at which it is led."""
-    if led.flies and led.grounds:
+    if led.flies and led.has_grounded_form:
         return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
-    if led.grounds:
+    if led.has_grounded_form:
         return (
             f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
             f"{led.pace * led.stride / led.duration:.1f} m/s",

@@ -163,7 +163,7 @@ class Floor:
                 grip[k, edges] = nnls(system, np.concatenate([self._scale * demand.wrench[k], np.zeros(len(edges))]))[0]
         return grip
 
-    def lacking(self, demand: RequiredWrench, standing: Mask) -> Array:
+    def residual_norm(self, demand: RequiredWrench, standing: Mask) -> Array:
         """‖S (w − A f*)‖: residual under contact at the spheres in `standing` (m, k), shape (m,) [body weights]."""
         weighted_residual = self._scale * residual(demand, self.grip(demand, standing))
         return np.linalg.norm(weighted_residual, axis=1) / self.body_weight

@@ -126,14 +126,14 @@ class Clip:
         return PlanarDisplacement(float(last[0] - start[0]), float(last[1] - start[1]), yaw)
 
     @property
-    def least_upright(self) -> float:
+    def min_pelvis_cosine(self) -> float:
         """Least vertical component of the pelvis axis, −1 to 1."""
         return float((1.0 - 2.0 * (self.poses[:, 4] ** 2 + self.poses[:, 5] ** 2)).min())
 
     @property
     def turns_over(self) -> bool:
         """Whether the pelvis is upside down at some time, more than 120° from upright."""
-        return self.least_upright < _UPSIDE_DOWN_COSINE
+        return self.min_pelvis_cosine < _UPSIDE_DOWN_COSINE
 
     def resized(self, size: float) -> "Clip":
         """The motion of a figure with lengths `size` times as long: p′ = size p of the root, the same rotations."""

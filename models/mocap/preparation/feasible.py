@@ -329,7 +329,7 @@ class _Problem:
             gain = self.w.strain * (strain[strained] != 0) / torque_limit()
             force_response = demand.levers()[strained] @ force_gain[strained]
             torque = dynamics.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
-            torque[:, 0] -= dynamics.leaning(forces, strained)
+            torque[:, 0] -= dynamics.torque_by_contact_force(forces, strained)
             jacobian[strained, :, :_TORQUE_END] = gain[:, None, :, None] * torque
 
 

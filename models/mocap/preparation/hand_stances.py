@@ -87,4 +87,4 @@ def _residual_decrease(calm: Array, frames: npt.NDArray[np.intp], feet: Mask, ha
     v, a = 0.5 * (steps[inner - 1] + steps[inner]), (steps[inner] - steps[inner - 1]) * fps
     demand = floor.demand(calm[inner], v, a)
     without_hands, with_hands = (np.concatenate((feet, palms), axis=1) for palms in (np.zeros_like(hands), hands))
-    return floor.lacking(demand, without_hands) - floor.lacking(demand, with_hands)
+    return floor.residual_norm(demand, without_hands) - floor.residual_norm(demand, with_hands)

@@ -98,7 +98,7 @@ class InverseDynamics:
         self.wrench[:, 0, 3:] += cross_matrix(force[:, :3]) @ relative
         self.torque = partials[:, :, 6:]
 
-    def leaning(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
+    def torque_by_contact_force(self, pushes: Array, states: npt.NDArray[np.intp]) -> Array:
         """Derivative by position of the joint torques of constant contact forces, d(Jᵀ)/dx f: shape (n, 51, 57).
 
         Parameters

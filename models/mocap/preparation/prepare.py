@@ -68,7 +68,7 @@ class Prepared(NamedTuple):
         Result of the pace correction.
     looped : Looped
         Result of looping, before optimisation.
-    carried : float
+    root_shift : float
         Largest displacement of the root over the floor that keeps a supporting foot from sliding (`root_path`) [m].
     hands : HandLoad
         How long hands bear load, and how far their palms were moved to the floor; zeros if not `near`.
@@ -88,7 +88,7 @@ class Prepared(NamedTuple):
     report: RetargetReport | None
     paced: Paced
     looped: LoopedClip
-    carried: float
+    root_shift: float
     hands: HandLoad
     feasible: Feasible
     fidelity: Fidelity

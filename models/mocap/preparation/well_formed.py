@@ -63,7 +63,7 @@ class WellFormed:
         RMS over the joints of the difference of the ends' velocities if closed, else of the larger velocity [rad/s].
     flights : int
         Number of flights.
-    falling : float
+    flight_error : float
         RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
         Largest excess of a joint over its range [rad].
@@ -85,7 +85,7 @@ class WellFormed:
     closed: bool
     seam: float
     flights: int
-    falling: float
+    flight_error: float
     excess: float
     residual: float
     strain: float
@@ -115,10 +115,10 @@ class WellFormed:
                 f"an end moves with {exceeding_text(self.seam, MAX_END_SPEED)} rad/s; rest at both, "
                 f"{MAX_END_SPEED} at most"
             )
-        if self.falling > MAX_FLIGHT_ACCELERATION_ERROR:
+        if self.flight_error > MAX_FLIGHT_ACCELERATION_ERROR:
             found.append(
-                f"flights fall with {exceeding_text(self.falling, MAX_FLIGHT_ACCELERATION_ERROR)} m/s² beside gravity; "
-                f"{MAX_FLIGHT_ACCELERATION_ERROR} at most"
+                f"flights fall with {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} m/s² beside "
+                f"gravity; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
             )
         if self.excess > MAX_LIMIT_EXCESS:
             found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
@@ -142,7 +142,7 @@ class WellFormed:
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "
             f"{'seam differ by' if self.closed else 'ends'} {self.seam:.2f} rad/s",
             f"{self.outliers} frames stand out; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
-            f"{self.flights} flights, {self.falling:.1f} m/s² beside gravity; contact lacks "
+            f"{self.flights} flights, {self.flight_error:.1f} m/s² beside gravity; contact lacks "
             f"{100 * self.residual:.1f} % of weight; {self.joint} needs {100 * self.strain:.0f} % of its torque limit",
         )
 

@@ -79,7 +79,7 @@ class BodyLines(NamedTuple):
         """Upper arm × forearm, both of unit length, shape (n, 2, 3)."""
         return np.cross(unit(self.elbows - self.shoulders), unit(self.wrists - self.elbows))
 
-    def filled(self, fps: float) -> Mask:
+    def padding(self, fps: float) -> Mask:
         """Padding: frames at the ends that repeat the motion's first or last frame, without that frame, shape (n,).
 
         Nothing moves in them, for at least `_MIN_PADDING_TIME`, although the motion was cut while moving. A body that

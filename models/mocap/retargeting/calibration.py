@@ -88,7 +88,7 @@ def calibrate(
     """
     body, (min_bend, straight) = _Body(roles, parents, rotations), _straightness(lines, rest_frame)
     # A pose that is repeated as padding counts once.
-    weights = np.where(lines.filled(fps), 0.0, 1.0)
+    weights = np.where(lines.padding(fps), 0.0, 1.0)
     straight = straight if rest_frame is not None else straight * weights
     _set_trunk(body, lines, straight)
     _set_head(body, up, straight)

@@ -105,7 +105,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
     propped = unsupported_time(lines, frames.positions[:, body], up.axis, motion.fps)
     broken, jumps = ([k for k in indices if k >= frames.dropped] for indices in (broken, jumps))
-    filled = lines.filled(motion.fps)[skipped:]
+    filled = lines.padding(motion.fps)[skipped:]
     lengths = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
     counted = ~filled & np.repeat(2 * lengths >= lengths.max(), lengths)  # not short pieces between jumps
     clip = Clip(_poses(*put_on_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)

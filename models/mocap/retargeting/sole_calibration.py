@@ -51,7 +51,7 @@ def foot_flat_frames(lines: BodyLines, k: int, source: Array, up: Array, fps: fl
     n = len(source)
     if n == 1:
         return np.array([0])
-    padding = lines.filled(fps)
+    padding = lines.padding(fps)
     places = [lines.lowest_joints[:, k]]
     if not np.isnan(lines.toes[:, k]).any():
         places.append(lines.toes[:, k])

@@ -25,7 +25,7 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
     ----------
     pushes : Array
         A `sim.users.hand.actions.push_table` of n pushes.
-    begun : Array
+    push_start_times : Array
         When each push began [s], NaN if it has not; shape (n,), updated.
     t : float
         Time [s].
@@ -141,7 +141,8 @@ def grab_force(
 class CompiledArm(NamedTuple):
     """An `Arm` as plain numbers and arrays.
 
-    Its state is `begun`, the start time of each push; `held`, the hand's position when each grab began; `switch` (1,).
+    Its state is `push_start_times`, the start time of each push; `held`, the hand's position when each grab began;
+    `switch` (1,).
     """
 
     stiffness: float
@@ -149,7 +150,7 @@ class CompiledArm(NamedTuple):
     path: Array
     period: float
     pushes: Array
-    begun: Array
+    push_start_times: Array
     grabs: Array
     held: Array
     switch: Array
@@ -165,7 +166,7 @@ def hand_force(arm: CompiledArm, t: float, p: Array, v: Array, force: Array) -> 
         force[0], force[1], force[2] = 0.0, 0.0, 0.0
     else:
         arm_force(arm.stiffness, arm.damping, arm.path, arm.period, t, p, v, force)
-        push_force(arm.pushes, arm.begun, t, p, force)
+        push_force(arm.pushes, arm.push_start_times, t, p, force)
         arm.switch[0] = grab_force(arm.stiffness, arm.damping, arm.grabs, arm.held, t, p, v, force)
 
 

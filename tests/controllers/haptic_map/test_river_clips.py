@@ -208,7 +208,7 @@ def test_own_river_takes_over_a_stopped_clip_but_not_a_playing_one() -> None:
 
 def test_clip_stops_at_the_nearest_rest_phase_also_over_the_seam() -> None:
     lap = CURVES[0].duration
-    resting = MAP.with_rests([np.array([0.2, 0.55 * lap]), np.zeros(0)])
+    resting = MAP.with_rest_phases([np.array([0.2, 0.55 * lap]), np.zeros(0)])
     params = resting.compiled().params
     for river, phase, distance, expected in (
         (0, 0.5 * lap, 0.1, 0.55 * lap), (0, 0.97 * lap, 0.0, 0.2), (0, 0.97 * lap, 0.03 * lap, 0.2),
@@ -222,7 +222,7 @@ def test_clip_stops_at_the_nearest_rest_phase_also_over_the_seam() -> None:
     np.testing.assert_array_equal(resting.pose(x), MAP.pose(x))
     for rests in ([np.zeros(1)], [np.array([np.nan]), np.zeros(0)]):
         with pytest.raises(ParameterError, match="phases of rest"):
-            MAP.with_rests(rests)
+            MAP.with_rest_phases(rests)
 
 
 def test_phase_rate_is_measured_over_the_seam() -> None:

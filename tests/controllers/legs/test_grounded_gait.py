@@ -84,7 +84,7 @@ def test_jacobian_by_argument_and_blend_matches_finite_differences(run, held):
 
 def test_walk_has_no_grounded_form(figure):
     led, gait = led_map(embedded("walk"), figure)
-    assert not led.grounds
+    assert not led.has_grounded_form
     assert not gait.flies
     np.testing.assert_array_equal(led.pose(walker(0.7, 1.0)), led.pose(walker(0.7, 0.0)))
     np.testing.assert_array_equal(led.jacobian(walker(0.7, 1.0))[:, 1], 0.0)
@@ -95,6 +95,6 @@ def test_one_legged_hop_cannot_be_grounded(figure):
     standing = contacts(clip).planted[:-1]
     hop = np.column_stack([standing.any(axis=1), np.zeros(len(standing), dtype=bool)])
     hop[: len(hop) // 2] = False
-    assert Led((clip.poses, clip.fps), figure_legs(figure), standing=standing).grounds
+    assert Led((clip.poses, clip.fps), figure_legs(figure), standing=standing).has_grounded_form
     # After a flight of more than half a lap onto the same foot its earlier and later stances would overlap.
-    assert not Led((clip.poses, clip.fps), figure_legs(figure), standing=hop).grounds
+    assert not Led((clip.poses, clip.fps), figure_legs(figure), standing=hop).has_grounded_form

@@ -126,7 +126,7 @@ def test_rolling_sole_lies_flat_between_heel_and_toes(figure) -> None:
 def test_capture_with_flight_is_grounded(figure) -> None:
     clip = skating("run")
     led, gait = led_map(clip, figure)
-    assert (led.flies, led.grounds, gait.flies, gait.grounded) == (False, True, False, True)
+    assert (led.flies, led.has_grounded_form, gait.flies, gait.grounded) == (False, True, False, True)
     # Its limbs swing as fast as in the run already.
     assert leading(Lead(), gait).walking.forward == 1.0
     # The best lap has two of its six steps.

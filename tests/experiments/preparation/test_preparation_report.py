@@ -32,9 +32,9 @@ def test_flight_across_the_loop_seam_is_one_flight():
     )  # fmt: skip
     flights = clip_flights(cut)
     assert [end - start for start, end in flights] == pytest.approx([end - start for start, end in clip_flights(jump)])
-    assert well_formed(cut, flights).falling < 0.1
+    assert well_formed(cut, flights).flight_error < 0.1
     quick = Clip(cut.poses, 2.0 * cut.fps, "quick")
-    assert well_formed(quick, clip_flights(quick)).falling == pytest.approx(3.0 * GRAVITY, rel=0.05)
+    assert well_formed(quick, clip_flights(quick)).flight_error == pytest.approx(3.0 * GRAVITY, rel=0.05)
 
 
 def test_flights_raise_the_residual_bound():

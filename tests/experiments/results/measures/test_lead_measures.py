@@ -176,7 +176,7 @@ def test_clip_with_long_leaps_is_led_by_grounded_steps() -> None:
     far[:, 0] += np.cumsum(flies) * flights / flies.sum()
     led, gait = led_map(Clip(far, run.fps, "leaps"), figure_model())
     assert not led.flies
-    assert led.grounds
+    assert led.has_grounded_form
     assert gait.grounded
     assert gait.stride < run.displacement.x + flights
 
