@@ -19,7 +19,7 @@ PRINTS = {
     "replayed_hand": "the same hand would feel",
     "lifted_map": "walk → run",
     "own_map": "a push bows the trunk",
-    "own_device": "1 N moved it by 25 mm",
+    "own_device": "1 N moved it by",
     "robot_arm": "The joints turn through",
 }
 

@@ -204,7 +204,7 @@ def test_figure_follows_all_changes_between_three_clips_better_than_offsets() ->
     assert {(change.first, change.second) for change in found.changes} == {
         (a, b) for a in range(3) for b in range(3) if a != b
     }
-    seconds = river_tour._SECONDS
+    seconds = river_tour._DURATION
     by_offsets, by_changes = (
         followed(river_tour.toured(haptic_map, Figure(), FIGURE), seconds) for haptic_map in (map_with_offsets, found)
     )
