@@ -20,10 +20,10 @@ from controllers.state import Array, Pose
 from controllers.work_array import work_array
 
 # Memory after the frame of the lap; phases are those of the round [s].
-# RIVER: river of the clip that is playing. PHASE: last phase of the hand. STILL: 1 while the clip is held at a phase.
-# COURSE: river whose curve gives the phase of the hand. CAME: phase at which the hand came to it. AHEAD: lead of the
-# clip over the hand at that moment. SHOWN: phase that is shown. CHANGE: change in progress (−1: none). GATE: its gate.
-# LOOKED: phase shown when gates were last searched.
+# ACTIVE_RIVER: river of the clip that is playing. HAND_PHASE: last phase of the hand. HELD: 1 while the clip is held at
+# a phase. TIMING_RIVER: river whose curve gives the phase of the hand. ENTRY_PHASE: phase at which the hand came to it.
+# LEAD: lead of the clip over the hand at that moment. CLIP_PHASE: phase that is shown. TRANSITION: change in progress
+# (−1: none). GATE_PHASE: its gate. LAST_SEARCH_PHASE: phase shown when gates were last searched.
 (
     ACTIVE_RIVER,
     HAND_PHASE,

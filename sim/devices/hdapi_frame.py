@@ -178,7 +178,7 @@ def serve_frame(memory: int) -> np.uint32:
     call_void(functions[_GET_INTEGERS], (_BUTTONS, numbers.ctypes.data + 8 * N_PRESSED))
     sample[SAMPLE_BUTTONS] = int32_at(numbers.ctypes.data + 8 * N_PRESSED)
     sample[SAMPLE_CLOCK] = seconds(functions[_CLOCK])
-    # While a command is being written, the previous one stays in use, until it is older than SILENCE.
+    # While a command is being written, the previous one stays in use, until it is older than `COMMAND_TIMEOUT`.
     read_whole(hd.command.changes, hd.command.shared, hd.command.whole, command)
     enable = command[COMMAND_ENABLE] > 0.0
     alive = enable and sample[SAMPLE_CLOCK] - command[COMMAND_CLOCK] <= COMMAND_TIMEOUT
