@@ -36,5 +36,5 @@ if __name__ == "__main__":
     device.write(np.array([-1.0, 0.0, 0.0]))
     for _ in range(100):
         time.sleep(0.001)
-        place = device.read().place
-    print(f"1 N moved it by {1e3 * (0.0477 - place[0]):.0f} mm in a tenth of a second")
+        position = device.read().position
+    print(f"1 N moved it by {1e3 * (0.0477 - position[0]):.0f} mm in a tenth of a second")

@@ -7,6 +7,7 @@ other device.
 
 import contextlib
 import importlib.util
+import math
 import sys
 import time
 import traceback
@@ -33,7 +34,7 @@ class TipPose(NamedTuple):
 
     Attributes
     ----------
-    place : Array
+    position : Array
         Position of the tip in the hand frame H [m], shape (3,): x away from the user, y to the left, z up.
     orientation : Array
         Rotation matrix R_HS of the stylus in H, shape (3, 3).
@@ -41,7 +42,7 @@ class TipPose(NamedTuple):
         Whether the stylus's switch is pressed.
     """
 
-    place: Array
+    position: Array
     orientation: Array = np.eye(3)
     pressed: bool = False
 
@@ -58,7 +59,7 @@ class TipDevice(ABC):
     watchdog : bool
         Whether its firmware switches the motors off when commands stop.
     largest_force : float
-        Largest force that `write` is given [N]; by default the stall force of the Phantom Premium 1.5.
+        Largest force that `write` is given [N], positive; by default the stall force of the Phantom Premium 1.5.
     """
 
     name: ClassVar[str] = ""
@@ -94,9 +95,18 @@ class TipDriver:
         File and class, for display.
     clock : callable
         Clock that timestamps the readings [s].
+
+    Raises
+    ------
+    SimError
+        If the device's largest force is not a positive number.
     """
 
     def __init__(self, device: TipDevice, transport: str, clock: Callable[[], float] = time.perf_counter):
+        if not 0.0 < device.largest_force < math.inf:
+            raise SimError(
+                f"{transport}: largest_force is {device.largest_force}; expected a positive number of newtons"
+            )
         self._device, self._clock = device, clock
         name, forces = device.name or type(device).__name__, type(device).write is not TipDevice.write
         self.identity = DeviceIdentity(
@@ -118,10 +128,10 @@ class TipDriver:
         if pose is None:
             return False
         fresh = self._reading
-        place, orientation = self._guarded(lambda: _checked(pose))
-        write_pose(fresh, np.array(R_HP).T @ place, orientation)
+        position, orientation, pressed = self._guarded(lambda: _checked(pose))
+        write_pose(fresh, np.array(R_HP).T @ position, orientation)
         self.telemetry[READ] += 1.0
-        fresh[READING_SWITCH], fresh[READING_CLOCK] = float(bool(pose.pressed)), self._clock()
+        fresh[READING_SWITCH], fresh[READING_CLOCK] = float(pressed), self._clock()
         fresh[READING_SEQUENCE] = self.telemetry[READ]
         np.copyto(reading, fresh)
         return True
@@ -142,7 +152,11 @@ class TipDriver:
             return
         theta = self._reading[READING_THETA : READING_THETA + 3]
         force_at_tip(theta, torque, self._device.largest_force, self._force)
-        self._guarded(lambda: self._device.write(self._force.copy()))
+        try:
+            self._guarded(lambda: self._device.write(self._force.copy()))
+        except DriverFault:
+            self.let_go()
+            raise
 
     def let_go(self) -> None:
         """Switch the motors off at once; never raises."""
@@ -152,7 +166,8 @@ class TipDriver:
     def close(self) -> None:
         """Switch the motors off and close the device."""
         self.let_go()
-        self._device.close()
+        with contextlib.suppress(DriverFault):
+            self._guarded(self._device.close)
 
     def _guarded(self, call: Callable[[], _Result]) -> _Result:
         """The result of a call of the user's code; an error in it is printed once, and becomes a fault."""
@@ -166,16 +181,19 @@ class TipDriver:
             raise DriverFault(Fault.UNPLUGGED if isinstance(error, OSError) else Fault.DEVICE_REPORTED) from None
 
 
-def _error_words(error: Exception) -> str:
+def _error_words(error: BaseException) -> str:
+    """File, line and error, in one line."""
+    if isinstance(error, SyntaxError):
+        return f"{error.filename}:{error.lineno}: SyntaxError: {error.msg}"
     where = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{where.filename}:{where.lineno}: {type(error).__name__}: {error}"
+    return f"{where.filename}:{where.lineno}: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
-def _checked(pose: TipPose) -> tuple[Array, Array]:
-    place, orientation = np.asarray(pose.place, np.float64), np.asarray(pose.orientation, np.float64)
-    if place.shape != (3,) or orientation.shape != (3, 3):
-        raise ValueError(f"read returned shapes {place.shape} and {orientation.shape}; expected (3,) and (3, 3)")
-    return place, orientation
+def _checked(pose: TipPose) -> TipPose:
+    position, orientation = np.asarray(pose.position, np.float64), np.asarray(pose.orientation, np.float64)
+    if position.shape != (3,) or orientation.shape != (3, 3):
+        raise ValueError(f"read returned shapes {position.shape} and {orientation.shape}; expected (3,) and (3, 3)")
+    return TipPose(position, orientation, bool(pose.pressed))
 
 
 def is_own_device(name: str) -> bool:
@@ -195,13 +213,15 @@ def own_device_class(name: str) -> type[TipDevice]:
     path = Path(file)
     if not path.is_file():
         raise SimError(f"there is no file {file}; expected FILE.py:CLASS, with a subclass of hvf.TipDevice")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
+    spec = importlib.util.spec_from_file_location(f"hvf_device_{path.stem}", path)
     assert spec is not None  # the name ends with .py
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[module.__name__] = module  # dataclasses look their module up there
+    sys.path.append(str(path.resolve().parent))  # as for a script: it may import files beside it
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SimError(_error_words(error)) from None
     found = {
         key: value for key, value in vars(module).items()
@@ -225,6 +245,6 @@ def open_own_device(name: str) -> TipDriver:
     made = own_device_class(name)
     try:
         device = made()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SimError(f"{name} does not open: {_error_words(error)}") from None
     return TipDriver(device, name)

@@ -1,5 +1,6 @@
 """A user-defined device: a class in a file."""
 
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,8 @@ def test_torque_that_is_not_finite_releases_the_device() -> None:
     ("pose", "fault"),
     [
         (OSError("gone"), Fault.UNPLUGGED), (ValueError("a bad cable"), Fault.DEVICE_REPORTED),
-        (TipPose(np.zeros(2)), Fault.DEVICE_REPORTED), ("here", Fault.DEVICE_REPORTED),
+        (TipPose(np.zeros(2)), Fault.DEVICE_REPORTED),
+        (TipPose(np.zeros(3), pressed=np.zeros(2)), Fault.DEVICE_REPORTED), ("here", Fault.DEVICE_REPORTED),
         (TipPose(np.array([0.0, np.nan, 0.0])), Fault.READING_NOT_FINITE),
         (TipPose(np.zeros(3), -np.eye(3)), Fault.READING_NOT_FINITE),
         (TipPose(np.array([0.9, 0.0, 0.0])), Fault.LEFT_WORKSPACE),
@@ -101,12 +103,57 @@ def test_exception_is_printed_once(capsys) -> None:
     assert capsys.readouterr().err.strip().count("ValueError: a bad cable") == 1
 
 
-def test_release_error_is_not_raised() -> None:
+def test_release_and_close_errors_are_not_raised(capsys) -> None:
     class Stuck(Scripted):
         def release(self):
             raise RuntimeError("stuck")
 
-    TipDriver(Stuck(), "here").let_go()
+        def close(self):
+            raise RuntimeError("stuck")
+
+    driver = TipDriver(Stuck(), "here")
+    driver.let_go()
+    driver.close()
+    assert capsys.readouterr().err.count("RuntimeError: stuck") == 2  # printed once for each place
+
+
+def test_motors_are_released_when_a_force_cannot_be_written() -> None:
+    class Broken(Scripted):
+        def write(self, force):
+            raise OSError("gone")
+
+    device = Broken(TipPose(POSITION))
+    with pytest.raises(DriverFault) as refused:
+        TipDriver(device, "here").write(np.zeros(3), enable=True)
+    assert refused.value.fault is Fault.UNPLUGGED
+    assert device.given == [None]
+
+
+@pytest.mark.parametrize("largest", [0.0, -1.0, np.nan, np.inf])
+def test_largest_force_that_limits_nothing_is_refused(largest) -> None:
+    device = Scripted()
+    device.largest_force = largest
+    with pytest.raises(SimError, match="expected a finite force above 0 N"):
+        TipDriver(device, "here")
+
+
+def test_file_may_define_dataclasses_and_import_its_neighbours(tmp_path) -> None:
+    (tmp_path / "neighbour_sdk.py").write_text("NAME = 'sdk'", encoding="utf-8")
+    text = """
+        from __future__ import annotations
+        from dataclasses import dataclass
+        import hvf, neighbour_sdk
+
+        @dataclass
+        class State:
+            x: float = 0.0
+
+        class Mine(hvf.TipDevice):
+            name = neighbour_sdk.NAME
+            def read(self): return None
+    """
+    (tmp_path / "mine.py").write_text(textwrap.dedent(text), encoding="utf-8")
+    assert open_device(f"{tmp_path}/mine.py:Mine").identity.name == "sdk"
 
 
 def test_device_without_write_has_no_motors() -> None:
@@ -146,7 +193,9 @@ def test_example_device_opens_by_file_and_class() -> None:
         ("import hvf\nclass Mine(hvf.TipDevice): ...", "own.py", "is named without its class; there is Mine"),
         ("x = 1\ny = z", "own.py:Mine", "own.py:2: NameError: name 'z'"),
         ("import hvf\nclass Mine(hvf.TipDevice): ...", "own.py:Mine", "does not open: .*abstract"),
-        ("def", "own.py:Mine", "SyntaxError"),
+        ("def", "own.py:Mine", r"own\.py:1: SyntaxError"),
+        ("raise SystemExit(0)", "own.py:Mine", "SystemExit"),
+        ("raise ValueError('a\\nb')", "own.py:Mine", "ValueError: a b"),
     ],
 )  # fmt: skip
 def test_file_without_usable_device_is_reported_in_one_line(tmp_path, text, name, why) -> None:
