@@ -104,9 +104,7 @@ class TipDriver:
 
     def __init__(self, device: TipDevice, transport: str, clock: Callable[[], float] = time.perf_counter):
         if not 0.0 < device.largest_force < math.inf:
-            raise SimError(
-                f"{transport}: largest_force is {device.largest_force}; expected a positive number of newtons"
-            )
+            raise SimError(f"{transport}: largest_force is {device.largest_force}; expected a finite force above 0 N")
         self._device, self._clock = device, clock
         name, forces = device.name or type(device).__name__, type(device).write is not TipDevice.write
         self.identity = DeviceIdentity(
