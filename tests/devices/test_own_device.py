@@ -126,7 +126,7 @@ def test_motors_are_released_when_a_force_cannot_be_written() -> None:
     with pytest.raises(DriverFault) as refused:
         TipDriver(device, "here").write(np.zeros(3), enable=True)
     assert refused.value.fault is Fault.UNPLUGGED
-    assert device.given == [None]
+    assert device.written == [None]
 
 
 @pytest.mark.parametrize("largest", [0.0, -1.0, np.nan, np.inf])
