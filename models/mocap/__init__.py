@@ -1,1 +1,1 @@
-"""Motion capture: clips, readers, writer, retargeting, preparation, dynamics, authoring."""
+"""Motion capture: clips, readers, writer, retargeting, preparation, dynamics."""

@@ -22,7 +22,6 @@ import numpy.typing as npt
 from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
-from models.mocap.dynamics.spacetime import JOINT_LIMIT_MARGIN
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import vectors_in_ranges
@@ -30,6 +29,7 @@ from models.mocap.preparation.change import DEGREE, Change, NormalEquations
 from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
 
+JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
 _STRAIN_THRESHOLD = 0.75  # fraction of the legs' torque limits beyond which torque is penalised
 # Spacing of knots and of sampled instants [s]. With 80 and 20 ms preparation takes half the time, but the figure falls
 # in a run.

@@ -13,7 +13,6 @@ from models.humanoid.skeleton import (
     figure_model,
     rest_pose,
 )
-from models.mocap.dynamics.coordinates import poses as pose_of
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, residual
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
@@ -25,6 +24,7 @@ from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import stances
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.preparation.push_up import PALMS, held, propped
+from tools.clip_authoring.coordinates import poses as pose_of
 
 
 @pytest.fixture(scope="module", name="held")

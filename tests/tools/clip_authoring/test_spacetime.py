@@ -1,17 +1,14 @@
-"""Coordinates, floor forces and the spacetime optimisation, against MuJoCo and finite differences."""
+"""Coordinates and the spacetime optimisation, against MuJoCo and finite differences."""
 
 import mujoco
 import numpy as np
 import pytest
 
 from models.errors import ModelError
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, N_TANGENT, figure_model, rest_pose
-from models.mocap.authoring import flights, gait
-from models.mocap.dynamics.coordinates import coordinate, poses, reflection, states
-from models.mocap.dynamics.floor_forces import Floor, residual
-from models.mocap.dynamics.spacetime import Motion, Task
-
-STANDING = np.ones((1, 8), dtype=bool)
+from models.humanoid.skeleton import N_TANGENT, figure_model
+from tools.clip_authoring import flights, gait
+from tools.clip_authoring.coordinates import coordinate, poses, reflection, states
+from tools.clip_authoring.spacetime import Motion, Task
 
 
 @pytest.fixture(scope="module")
@@ -62,61 +59,6 @@ def test_unknown_coordinate_is_refused_by_name():
     assert coordinate("left_knee", "y") == 3 * (2 + 12) + 1
     with pytest.raises(ModelError, match="tail"):
         coordinate("tail", "x")
-
-
-def test_floor_forces_support_a_standing_figure():
-    floor = Floor()
-    zero = np.zeros((1, N_TANGENT))
-    demand = floor.demand(rest_pose()[None], zero, zero)
-    grip = floor.grip(demand, STANDING)
-    assert np.abs(residual(demand, grip)).max() < 0.1
-    assert grip.min() >= 0
-    assert grip.sum() == pytest.approx(floor.body_weight, rel=1e-3)
-
-
-def test_floor_force_is_zero_in_the_air_and_never_pulls():
-    floor = Floor()
-    zero = np.zeros((1, N_TANGENT))
-    demand = floor.demand(rest_pose()[None], zero, zero)
-    np.testing.assert_array_equal(floor.grip(demand, ~STANDING), 0)
-    falling = zero.copy()
-    falling[0, 2] = -3 * 9.81
-    demand = floor.demand(rest_pose()[None], zero, falling)
-    missing = residual(demand, floor.grip(demand, STANDING))
-    assert missing[0, 2] == pytest.approx(-2 * floor.body_weight, rel=1e-6)
-
-
-def test_friction_force_is_bounded():
-    floor = Floor()
-    zero, sideways = np.zeros((1, N_TANGENT)), np.zeros((1, N_TANGENT))
-    sideways[0, 1] = 3 * 9.81
-    demand = floor.demand(rest_pose()[None], zero, sideways)
-    missing = residual(demand, floor.grip(demand, STANDING))
-    assert np.linalg.norm(missing[0, :3]) > 0.5 * floor.body_weight
-
-
-def test_torques_match_mujoco_contact_jacobians(figure):
-    model, data = figure
-    rng = np.random.default_rng(2)
-    q, v, a = states(*random_state(rng, 0.3))
-    floor = Floor()
-    demand = floor.demand(q, v, a)
-    grip = rng.uniform(0, 200, (4, 32))
-    torque = demand.torque_on(grip)
-    edges = demand.columns()[0, :3, :4].T
-    for k in range(len(q)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
-        mujoco.mj_inverse(model, data)
-        expected = data.qfrc_inverse.copy()
-        for sphere, name in enumerate(FOOT_CONTACTS):
-            geom = model.geom(name)
-            jacobian = np.empty((3, N_TANGENT))
-            point = data.geom_xpos[geom.id] - (0, 0, CONTACT_RADIUS)
-            mujoco.mj_jac(model, data, jacobian, None, point, geom.bodyid[0])
-            expected -= jacobian.T @ (grip[k, 4 * sphere : 4 * sphere + 4] @ edges)
-        np.testing.assert_allclose(torque[k], expected[6:], atol=1e-8)
-        at_com = residual(demand, grip)[k]
-        np.testing.assert_allclose(at_com[:3], expected[:3], atol=1e-8)
 
 
 @pytest.mark.slow

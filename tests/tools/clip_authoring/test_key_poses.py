@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, rest_pose
-from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at, solve_leg
 from models.mocap.motion.clip import Clip
+from tools.clip_authoring.key_poses import Arm, Choreography, Key, Lap, Step, poses_at, solve_leg
 
 HANGING = Arm(raised=0, plane=0, elbow=0)
 MODEL = figure_model()

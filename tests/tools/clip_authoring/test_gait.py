@@ -5,10 +5,10 @@ import pytest
 from clip_measures import G, acceleration, measured, rms, tangent_derivative
 
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
-from models.mocap.authoring import gait
-from models.mocap.dynamics.coordinates import coordinate
-from models.mocap.dynamics.spacetime import Motion
 from models.mocap.library import embedded
+from tools.clip_authoring import gait
+from tools.clip_authoring.coordinates import coordinate
+from tools.clip_authoring.spacetime import Motion
 
 GAITS = {"walk": gait.WALK, "run": gait.RUN}
 LEFT = slice(0, 4)

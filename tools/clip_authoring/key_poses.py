@@ -325,7 +325,7 @@ def poses_at(choreography: Choreography, t: Array, sway: Array | None = None) ->
     t : array, shape (n,)
         Times [s].
     sway : array, shape (n, 2), optional
-        Added to x and y of the pelvis [m]; see `models.mocap.authoring.balance`.
+        Added to x and y of the pelvis [m]; see `tools.clip_authoring.balance`.
 
     Returns
     -------

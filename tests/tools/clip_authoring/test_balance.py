@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from models.humanoid.skeleton import figure_model
-from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step, poses_at
-from models.mocap.authoring.balance import balanced_clip, dynamics
 from models.mocap.motion.clip import Clip
-from tests.models.mocap.authoring.support import distance_outside_support
+from tests.tools.clip_authoring.support import distance_outside_support
+from tools.clip_authoring.balance import balanced_clip, dynamics
+from tools.clip_authoring.key_poses import Arm, Choreography, Key, Lap, Step, poses_at
 
 
 def lunge():

@@ -13,10 +13,10 @@ from scipy.interpolate import PchipInterpolator
 
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
-from models.mocap.authoring.authoring import Arm
-from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.spacetime import Motion, Stance, Task, Weights
 from models.mocap.motion.clip import Clip
+from tools.clip_authoring.coordinates import coordinate, poses, reflection
+from tools.clip_authoring.key_poses import Arm
+from tools.clip_authoring.spacetime import Motion, Stance, Task, Weights
 
 FPS = 120.0  # [1/s]
 _HALF_HIP_WIDTH = 0.0875  # half the distance of the hips [m]: the feet stand below them

@@ -1,10 +1,11 @@
-"""``python -m models.mocap [NAME ...]``: regenerate the embedded clips, all or those named, into ``clips/``."""
+"""``python -m tools.clip_authoring [NAME ...]``: regenerate the embedded clips, all or those named, in place."""
 
 import sys
 from pathlib import Path
 
-from models.mocap.authoring import choreography, flights, gait
+import models.mocap
 from models.mocap.readers.own_bvh import write_bvh
+from tools.clip_authoring import choreography, flights, gait
 
 CLIPS = choreography.CLIPS | gait.CLIPS | flights.CLIPS
 
@@ -16,7 +17,7 @@ def main(names: list[str]) -> int:
         print(f"no clip {', '.join(unknown)}; there are {', '.join(CLIPS)}", file=sys.stderr)
         return 2
     for name in names or CLIPS:
-        path = Path(__file__).parent / "clips" / f"{name}.bvh"
+        path = Path(models.mocap.__file__).parent / "clips" / f"{name}.bvh"
         clip = CLIPS[name]()
         write_bvh(clip, path)
         print(f"{path.name}: {clip.n_frames} frames, {clip.duration:.2f} s")

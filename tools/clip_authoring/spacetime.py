@@ -17,13 +17,13 @@ from scipy.interpolate import BSpline
 from models.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
-from models.mocap.dynamics.coordinates import states
 from models.mocap.dynamics.floor_forces import Floor, RequiredWrench, residual
+from models.mocap.preparation.feasible import JOINT_LIMIT_MARGIN
+from models.mocap.preparation.stances import LOAD_DELAY
+from tools.clip_authoring.coordinates import states
 
 DEGREE = 5
 _STRAIN_THRESHOLD = 0.8  # fraction of the torque limits beyond which strain counts: a fifth is left for the feedback
-LOAD_DELAY = 0.012  # a sphere stands for this time before and after it bears load [s]: no force without contact
-JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
 
 
 class Stance(NamedTuple):

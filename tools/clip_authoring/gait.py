@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from models.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
-from models.mocap.dynamics.coordinates import coordinate, poses, reflection
-from models.mocap.dynamics.spacetime import Motion, Stance, Task
 from models.mocap.motion.clip import Clip
+from tools.clip_authoring.coordinates import coordinate, poses, reflection
+from tools.clip_authoring.spacetime import Motion, Stance, Task
 
 FPS = 120.0  # [1/s]
 _ACTIVE_DOFS = (

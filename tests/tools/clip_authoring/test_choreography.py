@@ -7,12 +7,12 @@ from scipy.signal import argrelmax
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, figure_model, joint_range
-from models.mocap import __main__ as clip_generator
-from models.mocap.authoring.balance import dynamics
-from models.mocap.authoring.choreography import CLIPS
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import pose_difference
-from tests.models.mocap.authoring.support import distance_outside_support
+from tests.tools.clip_authoring.support import distance_outside_support
+from tools.clip_authoring import __main__ as clip_generator
+from tools.clip_authoring.balance import dynamics
+from tools.clip_authoring.choreography import CLIPS
 
 MODEL = figure_model()
 IN_PLACE = ("angry", "cheer", "spin", "squat_dance")

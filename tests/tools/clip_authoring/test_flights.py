@@ -6,8 +6,8 @@ from clip_measures import G, acceleration, measured, tangent_derivative
 from scipy.spatial.transform import Rotation
 
 from models.humanoid.skeleton import BODIES
-from models.mocap.authoring import flights
 from models.mocap.library import embedded
+from tools.clip_authoring import flights
 
 FLIGHTS = {"jump": flights.JUMP, "backflip": flights.BACKFLIP}
 

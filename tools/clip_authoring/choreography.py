@@ -1,4 +1,4 @@
-"""Key poses and footsteps of the embedded dances and gestures, interpolated by `models.mocap.authoring.authoring`.
+"""Key poses and footsteps of the embedded dances and gestures, interpolated by `tools.clip_authoring.key_poses`.
 
 Angles in degrees, lengths in metres, times in seconds; the figure faces +x, its left is +y.
 """
@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.mocap.authoring.authoring import Arm, Choreography, Key, Lap, Step
-from models.mocap.authoring.balance import balanced_clip
 from models.mocap.motion.clip import Clip
+from tools.clip_authoring.balance import balanced_clip
+from tools.clip_authoring.key_poses import Arm, Choreography, Key, Lap, Step
 
 FPS = 60.0  # [1/s]
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from models.arrays import Array
-from models.mocap.authoring.balance import Dynamics
 from models.mocap.dynamics.zero_moment_point import nearest_supported
+from tools.clip_authoring.balance import Dynamics
 
 
 def distance_outside_support(motion: Dynamics) -> Array:

@@ -1,0 +1,1 @@
+"""Tools of the source tree, which are not installed."""
