@@ -5,7 +5,8 @@ stance foot need not be under the zero-moment point. For every mixture of the cl
 compared with the nearest supported point p* of the floor, and the root is moved by the sway of the cart-table model for
 the error p* − p (`models.mocap.dynamics.zero_moment_point`).
 
-The clips' own imbalance, interpolated by the weights of the mixture, is not corrected: a clip alone does not sway.
+The clips' own imbalance, interpolated by the weights of the mixture, is not corrected: a clip alone does not sway. A
+led figure does, if its clip is a capture or its gait is too slow to fly.
 """
 
 from typing import NamedTuple
@@ -14,8 +15,10 @@ import mujoco
 import numpy as np
 
 from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.led import Led
 from controllers.legs.sole_heights import SWING_HEIGHT
 from controllers.state import Array
+from controllers.walking.gait import Gait
 from experiments.files.array_cache import cached_array
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
@@ -23,9 +26,10 @@ from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, 
 from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
-_LAP_SAMPLES = 96  # samples of a lap
-_ITERATIONS = 3  # each corrects the remaining error of the zero-moment point
-CUTOFF = 6.0  # highest frequency of the sway [Hz]
+_LAP_SAMPLES, _LED_LAP_SAMPLES = 96, 192  # samples of a lap
+_ITERATIONS, _LED_ITERATIONS = 3, 6  # each corrects the remaining error of the zero-moment point
+_LED_PACE = 0.8  # pace at which the sway of a led figure is computed, over the gait's own
+_CUTOFF = 6.0  # highest frequency of the sway [Hz]
 _SUPPORT_SCALE = 0.6  # the zero-moment point is to lie within the support scaled by this factor about its middle
 _MAX_SWAY = 0.2  # largest sway [m]
 
@@ -92,19 +96,42 @@ def _compute_sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -
         c, s = np.cos(turn), np.sin(turn)
         x, y = outside[..., 0], outside[..., 1]
         error = np.stack([c * x - s * y, s * x + c * y], axis=-1).transpose(1, 0, 2)
-        sway += sway_of(error, laps.height, lap, CUTOFF)
+        sway += sway_of(error, laps.height, lap, _CUTOFF)
         length = np.linalg.norm(sway, axis=-1, keepdims=True)
         sway *= np.minimum(1.0, _MAX_SWAY / np.maximum(length, 1e-12))
     return sway
 
 
+def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
+    """The same map with a sway of its flightless form that keeps the zero-moment point supported at 0.8 of its pace."""
+    if not led.sways:
+        return led
+    sway, result, seconds = np.zeros((_LED_LAP_SAMPLES, 2)), led, gait.stride / (_LED_PACE * gait.speed)
+    walker_states = np.zeros((_LED_LAP_SAMPLES + 2, 7))
+    walker_states[:, 0] = led.stride * (np.arange(-1, _LED_LAP_SAMPLES + 1) / _LED_LAP_SAMPLES - led.phase)
+    walker_states[:, 1] = walker_states[:, 3] = 1.0
+    for _ in range(_LED_ITERATIONS):
+        laps = _measured_laps(map_poses(result, walker_states)[None], seconds / _LED_LAP_SAMPLES, figure)
+        outside = laps.outside()
+        # In flights the mean root position is the clip's own: a constant offset would have to be undone there, which
+        # would throw the figure.
+        mean = outside[0].mean(axis=0) if gait.flies else 0.0
+        sway += sway_of(outside[0] - mean, laps.height, seconds, _CUTOFF)
+        swaying = led.with_sway(sway)
+        if not swaying.sways:
+            # This sway would need too low a root, so the previous one is kept.
+            break
+        result = swaying
+    return result
+
+
 def _lap_dynamics(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:
     places = haptic_map.places(2.0 * np.pi * np.arange(-1, _LAP_SAMPLES + 1) / _LAP_SAMPLES)
     poses = np.stack([map_poses(haptic_map, stylus) for stylus in places])
-    return measured_laps(poses, lap / _LAP_SAMPLES, figure)
+    return _measured_laps(poses, lap / _LAP_SAMPLES, figure)
 
 
-def measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
+def _measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
     """Dynamics of laps of poses (k, n + 2, 75) a time `step` [s] apart, with one pose before and one after each lap."""
     data = mujoco.MjData(figure)
     feet = [figure.geom(name).id for name in FOOT_CONTACTS]

@@ -11,15 +11,12 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
-from experiments.fitting.verdict import FPS, cached_verdict
+from experiments.fitting.verdict import FPS, Trial
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
-_DWELL_TIME, _TRANSFER_TIME = (
-    5.5,
-    0.3,
-)  # [s] on a river, enough for a gate and the transition; [s] from one river to the next
+_DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and the transition; [s] to the next river
 _DURATION = _DWELL_TIME * len(_ORDER)
 
 
@@ -56,7 +53,7 @@ def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: m
         Model of the figure alone.
     """
     made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
-    verdict = cached_verdict(__name__, lambda: toured(made, part, figure), _DURATION, made_of)
+    verdict = Trial(__name__, lambda: toured(made, part, figure), _DURATION, made_of).verdict()
     if verdict.bearable:
         return ()
     stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0

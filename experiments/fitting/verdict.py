@@ -1,4 +1,4 @@
-"""Trials, before a run, of how the physical figure follows a map's animation; results are cached."""
+"""Faults of a map's animation, and trials, before a run, of how the physical figure follows it; results are cached."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -9,7 +9,9 @@ import numpy.typing as npt
 from controllers.state import Array
 from experiments.console.progress import working
 from experiments.files.array_cache import cached_array
+from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from sim.compilation.sources import results_folder
 from sim.compilation.unit_workers import compile_units
@@ -17,8 +19,48 @@ from sim.compilation.unit_workers import compile_units
 MAX_RESIDUAL = RESIDUAL_IN_FLIGHTS
 """Largest acceptable RMS of the residual force [body weights]."""
 
+MAX_FOOT_SKATE = 0.02
+"""Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
+
+# Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and largest excess of a joint [rad].
+MAX_PENETRATION, MAX_JOINT_EXCESS = 0.01, np.deg2rad(5.0)
+
 SECONDS, FPS = 20.0, 120.0
 """Duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
+
+
+class Motion(NamedTuple):
+    """Measures of a motion's faults.
+
+    Attributes
+    ----------
+    residual : float
+        RMS of the force that floor contact cannot give, by inverse dynamics [body weights].
+    lowest : float
+        Height of the lowest point of the soles [m].
+    skate, furthest : float
+        Foot skate (`models.mocap.preparation.skate`), hands included: 95th percentile of the stances and largest [m].
+    """
+
+    residual: float
+    lowest: float
+    skate: float
+    furthest: float
+
+
+def motion_of(poses: Array, fps: float) -> Motion:
+    """Measure a motion (n, 75)."""
+    # Imported here: they load signal processing, which a run with cached results does not need.
+    from models.mocap.preparation.feasible import contact_forces
+    from models.mocap.preparation.poses import smoothed, sole_points
+    from models.mocap.preparation.skate import skates
+    from models.mocap.preparation.stances import stances
+
+    clip = Clip(poses, fps, "blend")
+    schedule = stances(clip, smoothed(clip))
+    support = contact_forces(clip, schedule)
+    slides, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
+    return Motion(support.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
 
 
 class Verdict(NamedTuple):
@@ -54,12 +96,10 @@ class Verdict(NamedTuple):
         return f"falls at {self.fell:.1f} s" if self.falls else f"lacks {100 * self.residual:.0f} % of weight"
 
 
-def cached_verdict(
-    module: str, show: Callable[[], Clip], seconds: float, made_of: Iterable[npt.NDArray[np.generic]]
-) -> Verdict:
-    """Let the physical figure follow an animation, and cache the verdict; needs compiled code.
+class Trial(NamedTuple):
+    """An animation that the physical figure is to follow; what is found is cached, and needs compiled code.
 
-    Parameters
+    Attributes
     ----------
     module : str
         Dotted name of the module that makes the animation: a change of its code invalidates the cache.
@@ -71,11 +111,33 @@ def cached_verdict(
         Everything else that the animation depends on.
     """
 
-    def find() -> Array:
-        from experiments.preparation.tracking_trial import followed  # imported late: loads signal processing
+    module: str
+    show: Callable[[], Clip]
+    seconds: float
+    made_of: Iterable[npt.NDArray[np.generic]]
 
-        with working("following the blend"):
-            result = followed(show(), seconds, compile_units)
-        return np.array([[result.residual, np.inf if result.fell is None else result.fell]])
+    def verdict(self) -> Verdict:
+        """How the figure follows."""
 
-    return Verdict(*cached_array(results_folder(module), "verdict", made_of, (1, 2), find)[0].tolist())
+        def find() -> Array:
+            from experiments.preparation.tracking_trial import followed  # imported late: loads signal processing
+
+            with working("following the blend"):
+                result = followed(self.show(), self.seconds, compile_units)
+            return np.array([[result.residual, np.inf if result.fell is None else result.fell]])
+
+        return Verdict(*self._cached("verdict", 2, find))
+
+    def is_sound(self) -> bool:
+        """Whether soles neither penetrate the floor nor skate and joints stay within their ranges, by tolerances."""
+
+        def find() -> Array:
+            shown = self.show()
+            motion = motion_of(shown.poses, shown.fps)
+            return np.array([[motion.lowest, motion.skate, beyond_ranges(shown.poses).max()]])
+
+        lowest, skate, beyond = self._cached("sound", 3, find)
+        return bool(lowest > -MAX_PENETRATION and skate <= MAX_FOOT_SKATE and beyond < MAX_JOINT_EXCESS)
+
+    def _cached(self, name: str, count: int, find: Callable[[], Array]) -> list[float]:
+        return cached_array(results_folder(self.module), name, self.made_of, (1, count), find)[0].tolist()

@@ -7,8 +7,7 @@ import numpy as np
 
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from experiments.fitting.blendable import not_blendable
-from experiments.fitting.leg_choice import MAX_JOINT_EXCESS, MAX_PENETRATION
-from experiments.fitting.similarity import MAX_FOOT_SKATE
+from experiments.fitting.verdict import MAX_FOOT_SKATE, MAX_JOINT_EXCESS, MAX_PENETRATION
 from experiments.lifting.lift import LiftedClips
 from experiments.lifting.map_quality import MapQuality, measure_map
 from experiments.lifting.motion_measure import MotionMeasure
@@ -126,7 +125,7 @@ def _fault_text(measure: MotionMeasure) -> str:
 
 
 def _is_motion(measure: MotionMeasure) -> bool:
-    """Whether a measured motion keeps its feet, its joints and the floor, within the tolerances of `leg_choice`."""
+    """Whether a measured motion keeps its feet, its joints and the floor, within the tolerances of `verdict`."""
     return (
         measure.slide <= MAX_FOOT_SKATE
         and measure.limits <= MAX_JOINT_EXCESS

@@ -25,7 +25,7 @@ from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable, off_pace, timing_clip, with_loop_first
-from experiments.fitting.similarity import motion_of
+from experiments.fitting.verdict import motion_of
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed

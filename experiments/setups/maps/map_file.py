@@ -13,15 +13,15 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.blendable import not_blendable
-from experiments.fitting.push_trials import followed_map
+from experiments.fitting.leg_choice import followed_map
 from experiments.fitting.similarity import arms
-from experiments.fitting.transition_places import carried_over
 from experiments.setups.maps.about_circle import about_circle
 from experiments.setups.maps.place import place_of
 from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,
     best_transition,
+    carried_over,
     curve_number,
     default_pushes,
     lifted_choice,

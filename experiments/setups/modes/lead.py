@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.fields.leading import Leading
+from controllers.haptic_map.led import Led
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import Array
 from controllers.walking.gait import Gait
 from controllers.walking.walking import Walking
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
-from experiments.fitting.led_balance import led_gains
 from experiments.results.measures.lead_measures import lead_summary
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
@@ -19,6 +19,7 @@ from experiments.setups.parts.hands import participant
 from experiments.setups.parts.leading_hand import BEND, leading_hand, s_curve
 from experiments.setups.parts.led_figure import LedParts
 from experiments.setups.parts.part_types import Measuring, Notes, Parts
+from sim.body.figure import FigureGains
 from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
@@ -32,6 +33,12 @@ _MAX_FLYING_LATERAL = 1.2
 # The same holds for a run led by steps: its limbs already swing as fast as in the run; if they swing faster, motors of
 # the stance leg saturate.
 _MAX_RUNNING_PACE = 1.0
+# A foot that is planned to bear load but is not held in place twists on the spot. A led figure may stop anywhere, so
+# its contact points are unloaded at half the height (reference_reach) at which they are released (stance_height).
+_WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005, unload_time=0.005)
+# A gait with flights changes feet within a hundredth of a second, and with the low reach would stand on neither foot; a
+# gait kept on the ground takes a little longer.
+_FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace(reference_reach=0.01)
 
 
 def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
@@ -52,7 +59,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
 
     return Parts(
         config=config, maps=maps, field=field, program=field.program(), course=course, user=_make_hand(config, field),
-        tank=tank, notes=notes, gains=led_gains(maps.haptic_map), walking=field.walking,
+        tank=tank, notes=notes, gains=_gains(maps.haptic_map), walking=field.walking,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
 
@@ -72,6 +79,11 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     running = {"forward": _MAX_RUNNING_PACE} if gait.flies or gait.grounded else {}
     walking = Walking(gait, (float(x), float(y)), -BEND, scale, **flying, **running)
     return Leading(walking, k_l=mode.leash, b=mode.damping)
+
+
+def _gains(led: Led) -> FigureGains:
+    """Gains of a led physical figure, by whether its gait flies, is kept on the ground, or walks."""
+    return _FLYING if led.flies else _STEPPING if led.has_grounded_form else _WALKING
 
 
 def _make_hand(config: RunConfig, field: Leading) -> Arm | Participant:

@@ -8,6 +8,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
+from controllers.state import stylus_path
 from experiments.config.modes import Rivers
 from experiments.setups.modes.rivers import SIDE_BY_SIDE_HYSTERESIS, river_time
 from experiments.setups.parts.budget import fastest
@@ -16,6 +17,7 @@ from experiments.setups.parts.hands import PUSH_START_DISTANCE
 from experiments.setups.parts.pace import check_reach, paced
 from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
+from sim.reference.reference import map_poses
 from sim.users.hand.actions import Push
 
 # Admissible speeds over the river's own: a hand from a neighbouring river has that river's speed.
@@ -25,6 +27,9 @@ _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 _PUSH_LEAD_TIME = 0.36
 _CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
+# [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 3 mm
+# apart at their transitions; captures are 1.6 m apart at one, where the figure falls.
+_MAX_CARRY_DISTANCE = 0.25
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
 HELD_GAINS = FigureGains(contact_reach=0.004)
@@ -106,6 +111,30 @@ def best_transition(haptic_map: Lifted, curve: str) -> MapTransition:
             f"{', '.join(pairs) or 'none'}; leave out --user push{', or begin on another --curve' * bool(pairs)}"
         )
     return own[0]
+
+
+def places_apart(made: Lifted, transition: MapTransition) -> float:
+    """Distance over the floor between the places of two motions at their transition [m]; needs compiled code.
+
+    With q_i the point of curve i at the transition's θ, it is that of the roots of h(q_first) and h(q_second) in one
+    frame of the lap. Transitions are found regardless of it: motions that travel there and back within a lap may be far
+    apart.
+    """
+    points = np.array([made.curve_point(i, transition.angle) for i in (transition.first, transition.second)])
+    first, second = map_poses(made, stylus_path(points), made.compiled().memory)[:, :2]
+    return float(np.linalg.norm(second - first))
+
+
+def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple[str, ...]]:
+    """The map, and a remark if a change at a transition moves the figure too far to be followed."""
+    apart = places_apart(made, transition)
+    if apart < _MAX_CARRY_DISTANCE:
+        return made, ()
+    names = f"{made.names[transition.first]} and {made.names[transition.second]}"
+    return made, (
+        f"where {names} agree, their places over the floor are {apart:.1f} m apart: a push over carries the figure "
+        "there within a quarter of a second, and it may fall; clips that stay in place, or keep going, suit better",
+    )
 
 
 def default_pushes(haptic_map: Lifted, curve: str, mode: Rivers) -> tuple[Push, ...]:

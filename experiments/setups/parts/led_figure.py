@@ -14,8 +14,8 @@ from controllers.state import Mask
 from controllers.walking.gait import Gait
 from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
+from experiments.fitting.balance import balanced_on_ground
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.led_balance import balanced_on_ground
 from experiments.setups.parts.clips import MIN_FLIGHT_DURATION, load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts

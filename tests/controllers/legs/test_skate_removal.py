@@ -134,7 +134,7 @@ def test_capture_with_flight_is_grounded(figure) -> None:
     assert 0.4 < led.pace < 0.8
     assert gait.speed == pytest.approx(led.pace * led.stride / led.duration)
     shown = soles(figure, [led.pose(walker(s)) for s in np.arange(0.0, gait.stride, 0.01)])
-    # Within the contact tolerance of `experiments.fitting.led_balance`.
+    # Within the contact tolerance of `experiments.setups.modes.lead`.
     assert shown[..., 2].min(axis=1).max() < 0.012
     standing = shown[..., 2].min(axis=1) < 0.003
     assert standing.mean() > 0.6

@@ -1,14 +1,17 @@
 """The choice of the clip whose legs carry the arms of the others, by trials of the physical figure."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
-from experiments.fitting import leg_choice as rule
+from experiments.fitting import hand_tours, leg_choice
 from experiments.fitting.figure_legs import figure_legs
-from experiments.fitting.leg_choice import animation_is_sound, select_legs, tour_animation, verdict_on
+from experiments.fitting.hand_tours import tour_of_domain
+from experiments.fitting.leg_choice import select_legs, trial_of
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import Verdict
+from experiments.fitting.verdict import Trial, Verdict
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 
@@ -30,12 +33,14 @@ def set_verdicts(
     """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials."""
     trials: list[object] = []
 
-    def verdict(haptic_map: Cylindrical, lap: float, parallel: bool) -> Verdict:
+    def verdict(trial: Trial) -> Verdict:
+        haptic_map = cast(Cylindrical, trial.show())
         trials.append((haptic_map.legs_of, haptic_map.share))
         return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
 
-    monkeypatch.setattr(rule, "verdict_on", verdict)
-    monkeypatch.setattr(rule, "animation_is_sound", lambda haptic_map, lap, parallel: haptic_map.legs_of in fit)
+    monkeypatch.setattr(leg_choice, "tour_of_domain", lambda haptic_map, lap, parallel: haptic_map)
+    monkeypatch.setattr(Trial, "verdict", verdict)
+    monkeypatch.setattr(Trial, "is_sound", lambda trial: trial.show().legs_of in fit)
     return trials
 
 
@@ -98,8 +103,8 @@ def test_trial_hand_covers_the_whole_map(
         places.append(points)
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
-    monkeypatch.setattr(rule, "map_poses", record_points)
-    tour_animation(maps[1], LAP, parallel)
+    monkeypatch.setattr(hand_tours, "map_poses", record_points)
+    tour_of_domain(maps[1], LAP, parallel)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
     assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
@@ -112,8 +117,8 @@ def test_trial_hand_covers_the_whole_map(
 
 @pytest.mark.slow
 def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
-    assert animation_is_sound(maps[1], LAP, False)
-    walk, run = verdict_on(maps[1], LAP, False), verdict_on(maps[0], LAP, False)
+    assert trial_of(maps[1], LAP, False).is_sound()
+    walk, run = trial_of(maps[1], LAP, False).verdict(), trial_of(maps[0], LAP, False).verdict()
     assert walk.bearable
     assert run.worse() > walk.worse()
     assert not run.bearable

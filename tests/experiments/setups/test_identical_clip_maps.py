@@ -10,7 +10,8 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.fitting.similarity import motion_at, motion_of
+from experiments.fitting.similarity import motion_at
+from experiments.fitting.verdict import motion_of
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
 from models.mocap.library import embedded

@@ -16,7 +16,7 @@ from experiments.config.options import run_config
 from experiments.fitting import river_changes, river_tour
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
-from experiments.fitting.verdict import Verdict
+from experiments.fitting.verdict import Trial, Verdict
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.setups import map_parts
@@ -163,7 +163,7 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
 ) -> None:
     from experiments.config.run_config import Figure
 
-    monkeypatch.setattr(river_tour, "cached_verdict", lambda *rest: verdict)
+    monkeypatch.setattr(Trial, "verdict", lambda _: verdict)
     assert river_tour.not_followed(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
 
 

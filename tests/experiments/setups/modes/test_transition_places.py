@@ -10,8 +10,8 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import MapTransition
 from experiments.config.options import run_config
 from experiments.files.map_files import load_figure_map, save_map
-from experiments.fitting.transition_places import carried_over, places_apart
 from experiments.lifting.lift import lift_clips
+from experiments.setups.modes.lifted_runs import carried_over, places_apart
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded

@@ -1,7 +1,7 @@
 """Trials of a lifted map with a hand pushed off its curve: what the physical figure follows, and the remarks."""
 
-from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,9 +10,10 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting import push_trials
+from experiments.fitting import hand_tours, leg_choice
+from experiments.fitting.hand_tours import tour_along_curve
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import Verdict
+from experiments.fitting.verdict import Trial, Verdict
 from experiments.lifting.lift import lift_clips
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
@@ -27,9 +28,9 @@ def lifted() -> Lifted:
 
 def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = lifted.curve(0)
-    pushed = push_trials.toured(lifted, curve, True).poses
-    monkeypatch.setattr(push_trials, "_PUSH_OFFSET", 0.0)
-    unpushed = push_trials.toured(lifted, curve, True).poses
+    pushed = tour_along_curve(lifted, curve, True).poses
+    monkeypatch.setattr(hand_tours, "_PUSH_OFFSET", 0.0)
+    unpushed = tour_along_curve(lifted, curve, True).poses
     difference = np.abs(pose_difference(unpushed, pushed)[:, 6:]).max(axis=1)
     times = np.arange(len(pushed)) / 120.0
     assert difference[times < 1.69].max() < 1e-9
@@ -40,7 +41,7 @@ def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypa
 def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lifted) -> None:
     curve = lifted.curve(0)
     pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    lateness = np.arange(360) / 120.0 - push_trials._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
+    lateness = np.arange(360) / 120.0 - hand_tours._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
     assert np.abs(lateness[:61]).max() < 1e-12
     # On radii of 40 to 60 mm.
     assert 8.0 / 68.0 < lateness[180] < 8.0 / 48.0
@@ -75,22 +76,22 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
     verdicts: dict[str | float, Verdict], legs: int | None, share: float, expected: tuple[str, ...], lifted: Lifted,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    def tried(module: str, show: Callable[[], Lifted], *_: object) -> Verdict:
-        part = show()
+    def tried(trial: Trial) -> Verdict:
+        part = cast(Lifted, trial.show())
         return verdicts["whole" if part.legs_of is None else part.share]
 
-    monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(push_trials, "cached_verdict", tried)
-    monkeypatch.setattr(push_trials, "is_sound", lambda *_: True)
-    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
+    monkeypatch.setattr(Trial, "verdict", tried)
+    monkeypatch.setattr(Trial, "is_sound", lambda *_: True)
+    part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, remarks) == (legs, share, expected)
 
 
 def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(push_trials, "toured", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(push_trials, "cached_verdict", lambda *_: Verdict(0.01, np.inf))
-    monkeypatch.setattr(push_trials, "is_sound", lambda *_: False)
-    part, remarks = push_trials.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
+    monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
+    monkeypatch.setattr(Trial, "verdict", lambda *_: Verdict(0.01, np.inf))
+    monkeypatch.setattr(Trial, "is_sound", lambda *_: False)
+    part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
     assert "feet skate" in remarks[0]
 
@@ -99,7 +100,7 @@ def test_legs_of_pushed_figure_equal_its_own_clip(lifted: Lifted) -> None:
     curve = lifted.curve(1)
     with_arms = lifted.with_legs_of(1, arms(lifted.limbs), 1.0)
     without_arms = lifted.with_legs_of(1, arms(lifted.limbs), 0.0)
-    pushed, own = (push_trials.toured(part, curve, True).poses for part in (with_arms, without_arms))
+    pushed, own = (tour_along_curve(part, curve, True).poses for part in (with_arms, without_arms))
     difference = np.abs(pose_difference(pushed, own))
     upper = [6 + 3 * (joint - 1) + axis for joint in arms(lifted.limbs) for axis in range(3)]
     assert difference[:, upper].max() > 0.01

@@ -1,0 +1,77 @@
+"""Animations of a map whose hand wanders and is pushed, for 21 s: what the physical figure then tries to follow."""
+
+import numpy as np
+
+from controllers.curves.trajectory import Trajectory
+from controllers.easing import cubic_steps
+from controllers.haptic_map.composite import Composite
+from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.lifted import Lifted
+from controllers.state import Array, stylus_path
+from experiments.fitting.verdict import FPS, SECONDS
+from models.mocap.motion.clip import Clip
+from sim.reference.reference import map_poses
+
+_DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
+_PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
+_PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
+_TIMES = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
+
+
+def domain(made: Cylindrical | Composite) -> Array:
+    """Intervals of r and z through which the hand moves [m], shape (2, 2)."""
+    return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
+
+
+def poses_about_circle(made: Cylindrical | Composite, r: Array | float, angles: Array, z: Array | float) -> Array:
+    """Poses of a map with the hand at cylindrical coordinates [m], [rad], shape (n, 75); needs compiled code."""
+    points = np.broadcast_arrays(r * np.cos(angles), r * np.sin(angles), z)
+    return map_poses(made, stylus_path(np.stack(points, axis=-1)))
+
+
+def tour_of_domain(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
+    """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
+
+    The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
+    so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
+    (`Follow.parallel`) its angular speed does not change.
+    """
+    turn, pushed = 2.0 * np.pi * _TIMES / SECONDS, _DOMAIN_FRACTION * _push_profile(_TIMES)
+    shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
+    low, high = domain(made).T
+    r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
+    middle = 0.5 * (low[0] + high[0])
+    pace = middle / (middle + pushed * (high[0] - low[0]))
+    elapsed = _TIMES if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    return Clip(poses_about_circle(made, r, 2.0 * np.pi / lap * elapsed, z), FPS, "blend")
+
+
+def tour_along_curve(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
+    """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
+
+    If the field does not keep the pace off the curve (`Follow.parallel`), a push does not change the hand's speed, so
+    its angular speed is lower the further out it is.
+    """
+    pushed = _PUSH_OFFSET * _push_profile(np.maximum(_TIMES - _PUSH_INTERVAL, 0.0))
+    elapsed = _TIMES if keeps_pace else _slowed_phase(curve, pushed)
+    phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
+    points = curve.point(curve.start + phases)
+    points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
+    return Clip(map_poses(made, stylus_path(points)), FPS, "pushed")
+
+
+def _push_profile(times: Array) -> Array:
+    """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
+    phase = times / _PUSH_INTERVAL % 2.0
+    ramp = np.minimum(phase, 2.0 - phase) * _PUSH_INTERVAL / _PUSH_TIME
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * _PUSH_INTERVAL) % 2.0 == 0.0, 1.0, -1.0))
+
+
+def _slowed_phase(curve: Trajectory, pushed: Array) -> Array:
+    """Phase since the curve's start [s] of a hand off the curve by `pushed` [m], at the speed that it has on it."""
+    elapsed = np.zeros(len(pushed))
+    for k, offset in enumerate(pushed[:-1]):
+        phase = elapsed[k] % curve.duration if curve.periodic else min(elapsed[k], curve.duration)
+        radius = float(np.hypot(*curve.point(curve.start + phase)[:2]))
+        elapsed[k + 1] = elapsed[k] + radius / (radius + offset) / FPS
+    return elapsed
