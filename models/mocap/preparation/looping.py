@@ -258,10 +258,10 @@ def _find_half_stride(clip: Clip) -> tuple[int, int, float] | None:
     both = Clip(np.vstack((clip.poses, mirrored(clip).poses)), clip.fps, clip.name)
     # Frames at the junction of both halves have no valid velocity.
     inner = frames[(frames > 0) & (frames < clip.n_frames - 1)]
-    distances = _distances(both, np.concatenate((inner, clip.n_frames + inner)))[: len(inner), len(inner) :]
     long_enough = inner[:, None] - inner[None, :] >= _MIN_HALF_STRIDE_TIME * clip.fps
     if not long_enough.any():
         return None
+    distances = _distances(both, np.concatenate((inner, clip.n_frames + inner)))[: len(inner), len(inner) :]
     # Rows are ends, columns mirrored starts.
     j, i = np.unravel_index(int(np.argmin(np.where(long_enough, distances, np.inf))), distances.shape)
     return (int(inner[i]), int(inner[j]), float(distances[j, i])) if distances[j, i] < _MAX_MIRRORED_GAP else None

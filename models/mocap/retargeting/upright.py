@@ -114,14 +114,15 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     rig = _describe_rig(_zero_pose_direction(motion, roles), lines, ~lost)
     if (lying := _lying_axis(best, rig.zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
-    min_score = _min_score(best, lead, at_rest, rig, lines, positions, frames)
     if rig.drawn is not None and _is_sitting(lines, frames, np.array(AXES[rig.drawn])):
-        best, lead, min_score = rig.drawn, max(lead, _MIN_LEAD), -np.inf
+        clear, best, lead = True, rig.drawn, max(lead, _MIN_LEAD)
     elif rig.contradicts(best, lead):
-        min_score, second = np.inf, str(rig.drawn)
-    if np.isnan(lines.ankles).any():
-        min_score = np.inf  # without ankles, the lowest joints are knees, which do not support a squat
-    if lead < _MIN_LEAD or scores[best] < min_score:
+        clear, second = False, str(rig.drawn)
+    else:
+        min_score = _min_score(best, lead, at_rest, rig, lines, positions, frames)
+        clear = lead >= _MIN_LEAD and scores[best] >= min_score
+    # Without ankles, the lowest joints are knees, which do not support a squat.
+    if not clear or np.isnan(lines.ankles).any():
         raise MotionFileError(
             motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
         )

@@ -161,8 +161,9 @@ def test_half_stride_is_continued_by_its_mirror_image(walks):
     np.testing.assert_allclose(speeds[: half - 2], np.roll(image_speeds, -half + 1)[: half - 2], rtol=0.1, atol=0.05)
 
 
-def test_mirror_option_without_a_half_stride_is_refused(walks):
-    standing = Clip(np.repeat(embedded("cheer").poses[:1], 12, axis=0), 120.0, "still")
+@pytest.mark.parametrize("frames", [2, 12])
+def test_mirror_option_without_a_half_stride_is_refused(frames):
+    standing = Clip(np.repeat(embedded("cheer").poses[:1], frames, axis=0), 120.0, "still")
     with pytest.raises(ModelError, match=r"--mirror.*expected a gait"):
         close_or_rest(standing, mirror=True)
 
