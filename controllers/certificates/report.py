@@ -63,6 +63,9 @@ class Verdict:
         if (self.verdict == "refuted") != bool(self.counterexample):
             raise CertificateError(f"a counterexample goes with what is refuted, and only with it; {self.reason}")
 
+    def __str__(self) -> str:
+        return f"{self.verdict}: {self.reason}"
+
 
 def without_laws(verdict: Verdict, laws: Sequence[str]) -> Verdict:
     """Verdict on a whole program, from the verdict on the program without some `laws`: certified becomes unknown.

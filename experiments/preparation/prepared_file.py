@@ -12,10 +12,15 @@ from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text
 from models.mocap.preparation.laps import frame_distances
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
+from models.mocap.retargeting.retarget_report import two_digits
 
 _ADDED_MOTION = {"way back": "the way back", "open": "coming to rest at both ends"}
 _MAX_NAMED = 3  # largest number of flights whose reasons are in the line for the terminal
 _MIN_OWN_FRACTION = 0.5  # fraction of the file's own motion in the clip below which it is reported
+_MAX_LOST_TURN = 30.0  # change of heading without which a cycle is not called the same motion [°]
+# Acceleration in flights below which a wrong frame rate is more likely than dancers' hovering feet [m/s²]: jumps have 8
+# to 12, dancers' steps 4 to 7.
+_MAX_SLOW_FALL = 4.0
 _MIN_ROOT_SHIFT = 0.02  # displacement of the root that is reported [m]: stances are extended over as much
 
 
@@ -114,8 +119,15 @@ def changes(made: Prepared) -> tuple[str, ...]:
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {made.clip.duration:.2f} s the file's own motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
+    turn, turn_at_rate = np.rad2deg(part.turns)
+    if abs(turn - turn_at_rate) > _MAX_LOST_TURN:
+        lines.append(
+            f"the capture turns by {turn:.0f}°, at the cycle's rate by {turn_at_rate:.0f}°: --loop open keeps its turns"
+        )
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+    elif pace.falls is not None and 0.0 < pace.falls < _MAX_SLOW_FALL:
+        lines.append(f"its flights fall with {two_digits(pace.falls)} m/s²: if they are jumps, state its --frame-rate")
     if made.root_shift > _MIN_ROOT_SHIFT:
         lines.append(
             f"carried over the floor by up to {100 * made.root_shift:.0f} cm, since a foot that bears the load slides"

@@ -1,6 +1,7 @@
 """Simulations from Python: put parts together, run them in memory or into a folder, step them tick by tick."""
 
 import itertools
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -135,6 +136,11 @@ class Tick(NamedTuple):
     force: Array
     pose: Array
     figure: Array
+
+    def __repr__(self) -> str:
+        x, y, z = 1e3 * self.hand.p
+        force = math.hypot(*self.force)
+        return f"<tick at {self.hand.t:.3f} s: tip at ({x:.1f}, {y:.1f}, {z:.1f}) mm, force {force:.2f} N>"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

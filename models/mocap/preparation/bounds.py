@@ -5,6 +5,8 @@ import numpy as np
 # Heights of soles in stance [m]; the preparation's prototype left a penetration of 3 mm.
 MIN_SOLE_HEIGHT, MAX_SOLE_HEIGHT = -0.003, 0.005
 MAX_SOLE_TILT = np.deg2rad(2.0)  # largest tilt of soles in stance
+# Depth of any sole at any time [m]: those that swing are the lower by low-pass filtering, up to 6 mm in 50 clips.
+MAX_SOLE_DEPTH = 0.01
 MAX_SKATE = 0.005  # foot skate in a stance [m]
 # RMS residual force [body weights]. For gaits and gestures, the bound of Hicks et al. (2015); for motions with flights,
 # the residual that the preparation's prototype left in fighting and jumping jacks (11 and 12 %).

@@ -1,11 +1,11 @@
 r"""Looping of captures: as a cycle, with a way back, or open and at rest at both ends.
 
 The distance d of two frames is that of `laps`. A part of the clip is its cycle if its ends are similar and the rest of
-the clip only repeats it; a cross-fade with the frames around its ends makes poses and velocities agree at the seam. A
-gesture, whose root ends about where it began, gets a way back to its first pose. Half a stride of a gait, whose end is
-the mirror image of its start, is continued by its mirror image. Everything else comes to rest at both ends. A closed
-motion with a foot that always stands returns exactly to its place: otherwise the foot would skate by the difference in
-every lap.
+the clip only repeats it, its turns included; a cross-fade with the frames around its ends makes poses and velocities
+agree at the seam. A gesture, whose root ends about where it began, gets a way back to its first pose. Half a stride of
+a gait, whose end is the mirror image of its start, is continued by its mirror image. Everything else comes to rest at
+both ends. A closed motion with a foot that always stands returns exactly to its place: otherwise the foot would skate
+by the difference in every lap.
 """
 
 from typing import Literal, NamedTuple
@@ -15,6 +15,7 @@ import numpy as np
 from models.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
+from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.laps import best_lap, frame_distances
@@ -31,6 +32,10 @@ _MAX_DECLARED_GAP = 0.45
 # Fraction of the clip's frames that must have a frame of the cycle within this d [rad]. A fraction of 0.5 loops all of
 # 19 captures the same way, 0.9 one differently; half of d leaves CMU 01_01 open, twice takes a dance for a cycle.
 _MIN_COVERED_FRACTION, _MAX_COVERED_DISTANCE = 0.7, 0.35
+# Largest difference of a frame's yaw rate, its mean over the cycle's duration, from the cycle's [rad/s]: a walk along a
+# curve is a cycle, a turn in a straight walk is not. Half leaves 11 of 156 captures open, among them runs; with twice
+# the cycles of eight lose their turns.
+_MAX_YAW_RATE_DIFFERENCE = np.deg2rad(20.0)
 # Least mean speed of a cycle relative to the clip's: standing still is no cycle. Half loops 19 captures the same way.
 _MIN_SPEED_RATIO = 0.7
 # Largest d between the end of half a stride and its mirrored start [rad]: a run has 0.18, a third of a stride 0.3.
@@ -76,6 +81,8 @@ class LoopedClip(NamedTuple):
         The part of the capture that was used [s]; `start` is negative for an open clip, which begins at rest before it.
     gap : float
         d between its ends before closing [rad].
+    turns : tuple of float
+        Change of heading in the capture, and what it would be at the loop's yaw rate [rad]; zeros if it is not cut.
     """
 
     clip: Clip
@@ -83,6 +90,7 @@ class LoopedClip(NamedTuple):
     start: float
     end: float
     gap: float
+    turns: tuple[float, float] = (0.0, 0.0)
 
 
 def close_or_rest(
@@ -158,7 +166,7 @@ def _find_cycle(clip: Clip) -> tuple[int, int, float] | None:
     """First frame, last frame and gap of the part that the clip repeats: a gait cycle, or else a cycle in place."""
     frame_step = -(-clip.n_frames // _COMPARED_FRAMES)
     frames = np.arange(0, clip.n_frames, frame_step)
-    distances = _distances(clip, frames)
+    distances, headings = frame_distances(clip, frames)
     lap = best_lap(clip)
     speeds = np.sqrt(np.mean(clip.velocities()[frames, 6:] ** 2, axis=1))
     candidates: list[tuple[int, int, float, float]] = []
@@ -171,11 +179,19 @@ def _find_cycle(clip: Clip) -> tuple[int, int, float] | None:
         candidates.append((int(frames[i]), int(frames[j]), float(candidates_apart[i, j]), _MAX_IN_PLACE_GAP))
     for start, end, gap, max_gap in candidates:
         inside = (frames >= start) & (frames <= end)
+        yaw_rate = np.diff(headings[inside][[0, -1]]) / (frames[inside][-1] - frames[inside][0])
         covered = distances[:, inside].min(axis=1) < _MAX_COVERED_DISTANCE
+        covered &= np.abs(_yaw_rates(frames, headings, end - start) - yaw_rate) < _MAX_YAW_RATE_DIFFERENCE / clip.fps
         moving = speeds[inside].mean() >= _MIN_SPEED_RATIO * speeds.mean()
         if gap < max_gap and moving and covered.mean() >= _MIN_COVERED_FRACTION:
             return start, end, gap
     return None
+
+
+def _yaw_rates(frames: IntArray, headings: Array, width: int) -> Array:
+    """Mean yaw rate over `width` frames around each frame, at the ends over the first or last ones [rad/frame]."""
+    first = np.clip(frames - width / 2, 0, max(frames[-1] - width, 0))
+    return (np.interp(first + width, frames, headings) - np.interp(first, frames, headings)) / width
 
 
 def _is_fast(clip: Clip) -> bool:
@@ -223,7 +239,10 @@ def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) ->
     result = Clip(lap, clip.fps, clip.name)
     if _is_in_place(result) and _has_standing_foot(result):
         result = _without_displacement(result)
-    return LoopedClip(result, "half stride" if half else "cycle", first / clip.fps, last / clip.fps, gap)
+    headings = np.unwrap(quaternions.heading(clip.poses[:, 3:7]))
+    turn, own_turn = headings[-1] - headings[0], 0.0 if half else headings[last] - headings[first]
+    turns = float(turn), float(own_turn * (clip.n_frames - 1) / n)
+    return LoopedClip(result, "half stride" if half else "cycle", first / clip.fps, last / clip.fps, gap, turns)
 
 
 def _has_standing_foot(clip: Clip) -> bool:
@@ -261,10 +280,15 @@ def _find_half_stride(clip: Clip) -> tuple[int, int, float] | None:
     long_enough = inner[:, None] - inner[None, :] >= _MIN_HALF_STRIDE_TIME * clip.fps
     if not long_enough.any():
         return None
-    distances = _distances(both, np.concatenate((inner, clip.n_frames + inner)))[: len(inner), len(inner) :]
+    distances, headings = frame_distances(both, np.concatenate((inner, clip.n_frames + inner)))
+    direct, crossed = distances[: len(inner), : len(inner)], distances[: len(inner), len(inner) :]
     # Rows are ends, columns mirrored starts.
-    j, i = np.unravel_index(int(np.argmin(np.where(long_enough, distances, np.inf))), distances.shape)
-    return (int(inner[i]), int(inner[j]), float(distances[j, i])) if distances[j, i] < _MAX_MIRRORED_GAP else None
+    j, i = np.unravel_index(int(np.argmin(np.where(long_enough, crossed, np.inf))), crossed.shape)
+    width = int(inner[j] - inner[i])
+    covered = np.minimum(direct, crossed)[:, i : j + 1].min(axis=1) < _MAX_COVERED_DISTANCE
+    covered &= np.abs(_yaw_rates(inner, headings[: len(inner)], 2 * width)) < _MAX_YAW_RATE_DIFFERENCE / clip.fps
+    fits = crossed[j, i] < _MAX_MIRRORED_GAP and covered.mean() >= _MIN_COVERED_FRACTION
+    return (int(inner[i]), int(inner[j]), float(crossed[j, i])) if fits else None
 
 
 def _smoothstep(x: float | Array) -> Array:

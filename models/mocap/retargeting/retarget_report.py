@@ -140,7 +140,7 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
 
 
 def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
-    """Soles calibrated from only a few of n frames, and a spine that is never straight."""
+    """Soles calibrated from only a few of n frames, a single shoulder, and a spine that is never straight."""
     few = [
         f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
@@ -149,6 +149,8 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
     if few:
         remark = "how the soles lie is a guess, since few frames tell"
         yield f"{remark} ({', '.join(few)}); --rest-frame would say it"
+    if sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
+        yield "there is one arm: how the chest lies is a guess, for the other shoulder is taken to be opposite"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it"
 

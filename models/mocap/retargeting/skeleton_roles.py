@@ -204,13 +204,12 @@ def _find_spine(
 ) -> list[int]:  # fmt: skip
     """Joints from the pelvis (or from its common ancestor with the chest) to the chest, where the arms meet."""
     arms = [named[part] for part in ("left_upper_arm", "right_upper_arm") if part in named]
+    free = _unassigned_joints(named, parents)
+    if len(arms) == 1:  # the head stands for the other arm
+        arms += [k for k in free if names[k].bare in _NECK | {"head"} and not names[k].side][:1]
     chest = named.get("chest", _meeting_point(arms[0], arms[1], parents) if len(arms) == 2 else None)
     if chest is None and len(arms) < 2:
-        trunk = [
-            k
-            for k in _unassigned_joints(named, parents)
-            if names[k].bare in _CHEST and not names[k].side and k != pelvis
-        ]
+        trunk = [k for k in free if names[k].bare in _CHEST and not names[k].side and k != pelvis]
         chest = max(trunk, key=lambda k: (k in parents, len(ancestry(k, parents))), default=None)
     if chest is None or chest == pelvis:
         return []

@@ -9,7 +9,11 @@ from models.gravity import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS
-from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation.feasible import Feasible
+from models.mocap.preparation.fidelity import fidelity
+from models.mocap.preparation.looping import LoopedClip
+from models.mocap.preparation.pace import Paced
+from models.mocap.preparation.prepare import HandLoad, Prepared, prepared
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -70,3 +74,18 @@ def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
     assert (
         "the file's own motion is 0.01 s; the rest is coming to rest at both ends, which is not in the file" in lines[1]
     )
+
+
+@pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
+def test_flights_that_fall_slowly_and_lost_turns_are_reported(falls, named):
+    clip = embedded("walk")
+    looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, (np.pi / 2.0, 0.1))
+    change = Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0)
+    made = Prepared(
+        clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0), change,
+        fidelity(clip, clip, looped, 1.0), 0.0, near=False,
+    )  # fmt: skip
+    lines = changes(made)
+    assert any("fall with 0.5 m/s²: if they are jumps, state its --frame-rate" in line for line in lines) == named
+    assert "the capture turns by 90°, at the cycle's rate by 6°: --loop open keeps its turns" in lines
+    assert not any("turns by" in line for line in changes(made._replace(looped=looped._replace(turns=(0.4, 0.1)))))

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import hvf
+from controllers.certificates.report import Verdict
+from experiments.runs.simulation import Tick
 
 CURVE = hvf.circle()
 FIELD = hvf.Follow(CURVE, k_r=300, b_d=8)
@@ -48,3 +50,14 @@ def test_repr_is_short_and_without_addresses(part: object, text: str) -> None:
 def test_repr_shows_non_default_values() -> None:
     sim = hvf.Simulation(field=FIELD, haptic_map=Bow(), seed=3, figure=hvf.Figure(kind="none"))
     assert repr(sim).endswith("haptic_map=<Bow>, figure=Figure(kind='none'), seed=3)")
+
+
+def test_repr_of_a_tick_tells_time_tip_and_force() -> None:
+    hand = hvf.HandState(0.005, np.array([0.0477, 1e-3, 0.0]), np.eye(4)[0], np.zeros(3), np.zeros(3))
+    wrench, pose = hvf.Wrench(np.array([0.0, 0.3, 0.4]), np.zeros(3)), hvf.rest_pose()
+    tick = Tick(hand, wrench, wrench.force, pose, pose)
+    assert repr(tick) == "<tick at 0.005 s: tip at (47.7, 1.0, 0.0) mm, force 0.50 N>"
+
+
+def test_verdict_prints_as_outcome_and_reason() -> None:
+    assert str(Verdict("certified", "stable: …", 3.0, ("linear",))) == "certified: stable: …"

@@ -44,6 +44,53 @@ def test_lap_of_a_walk_is_found_and_closed(walks):
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
 
 
+@pytest.fixture(scope="module")
+def turning():
+    """Function of a yaw rate a frame: five and a half laps of the embedded walk, whose heading it turns on the spot."""
+    walk = resampled(embedded("walk"), 60.0)
+    n = walk.n_frames - 1
+
+    def turned(rates):
+        frames = np.arange(int(5.5 * n))
+        laps = [PlanarDisplacement(*(k // n) * walk.poses[n, :2], 0.0).moved(walk.poses[k % n]) for k in frames]
+        yaw, place, poses = 0.0, laps[0][:2], []
+        for k, pose in enumerate(laps):
+            step = pose[:2] - laps[max(k - 1, 0)][:2]
+            yaw += rates(k / len(frames))
+            c, s = np.cos(yaw), np.sin(yaw)
+            place = place + np.array([[c, -s], [s, c]]) @ step
+            row = pose.copy()
+            row[:2] = 0.0
+            row = PlanarDisplacement(0.0, 0.0, yaw).moved(row)
+            row[:2] = place
+            poses.append(row)
+        return Clip(np.array(poses), walk.fps, "turning")
+
+    return turned, walk.duration / 2
+
+
+def test_walk_along_a_curve_is_a_cycle_that_turns(turning):
+    turned, stride = turning
+    found = close_or_rest(turned(lambda x: 0.004))
+    assert found.kind == "cycle"
+    assert found.clip.duration < 2.5 * stride
+    assert found.turns[0] == pytest.approx(found.turns[1], abs=np.deg2rad(10.0))
+
+
+def test_cycle_of_a_walk_keeps_a_turn_that_lasts_half_of_it(turning):
+    """A straight stride would be the best cycle."""
+    turned, _ = turning
+    found = close_or_rest(turned(lambda x: 0.02 if 0.4 < x < 0.85 else 0.0))
+    assert found.kind == "open" or abs(found.clip.displacement.yaw) > np.deg2rad(45.0)
+
+
+def test_turn_that_a_cycle_lacks_is_measured(turning):
+    turned, _ = turning
+    found = close_or_rest(turned(lambda x: 0.02 if x > 0.9 else 0.0))
+    assert found.kind == "cycle"
+    assert found.turns[0] > np.deg2rad(40.0) > np.deg2rad(15.0) > found.turns[1]
+
+
 def test_looped_returns_a_closed_clip_unchanged(walks):
     assert close_or_rest(walks[0]).clip is walks[0]
 
@@ -270,6 +317,17 @@ def test_low_moving_sole_part_without_load_does_not_count_as_foot_skate(walks):
     points = sole_points(walk.poses)
     all_slides = stance_slides(points, schedule.standing)
     assert well_formed(walk, ()).slid < all_slides.max()
+
+
+def test_sole_below_the_floor_is_a_fault_though_it_does_not_stand(walks):
+    walk = walks[0]
+    flexed = np.zeros((walk.n_frames, 57))
+    swing = sole_points(walk.poses)[:, 4:, 2].min(axis=1) > 0.015
+    flexed[swing, 6 + 3 * JOINTS.index("right_ankle") + 1] = np.deg2rad(70.0)
+    sunk = well_formed(Clip(add_tangents(walk.poses, flexed), walk.fps, "sunk"), ())
+    assert sunk.depth > 0.03
+    assert any("below the floor; 10 at most" in line for line in sunk.faults())
+    assert well_formed(walk, ()).depth < 0.003
 
 
 def test_embedded_walk_is_well_formed(walks):

@@ -12,7 +12,7 @@ from models.mocap.motion import quaternions
 from models.mocap.motion.clip import pose_difference
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import retarget
-from models.mocap.retargeting.skeleton_roles import roles_of
+from models.mocap.retargeting.skeleton_roles import joints_below, roles_of
 from tests.models.mocap.readers.motion_files import AMC, ASF
 
 # Walk, run, jump, dance and kick, from skeletons that differ in rest pose, names, axes and units.
@@ -296,3 +296,33 @@ def test_unit_of_the_format_is_doubted_if_it_gives_legs_of_no_human(tmp_path, le
     assert report is not None
     assert "(the format says so), legs" in report.unit
     assert (NON_HUMAN_LEGS in report.unit) != human
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("name", ["cmu_bvh/131_03.bvh", "snu/walk.bvh", "snu/dance.bvh", "xia/angry_13_000.bvh"])
+def test_body_with_one_arm_keeps_its_trunk_and_head(mocap, model, name, side):
+    motion = read_motion(mocap / name)
+    roles = roles_of(motion.joints, motion.parents)
+    arm = joints_below(roles.segments.get(f"{side}_clavicle", roles.segments[f"{side}_upper_arm"]), motion.parents)
+    names = tuple("" if k in arm else joint for k, joint in enumerate(motion.joints))
+    whole, _ = retarget(motion, roles)
+    clip, report = retarget(motion, roles_of(names, motion.parents))
+    assert any("one arm" in remark for remark in report.remarks)
+    assert {"chest", "head", "abdomen"} & roles.segments.keys() <= report.taken.keys()
+    bodies = [BODIES.index(body) for body in ("pelvis", "chest", "head")]
+    turned = quaternions.product(
+        quaternions.conjugate(body_rotations(model, whole)[:, bodies]), body_rotations(model, clip)[:, bodies]
+    )
+    angles = 2.0 * np.arccos(np.clip(np.abs(turned[..., 0]), 0.0, 1.0))
+    assert np.rad2deg(np.median(angles, axis=0)).max() < 14.0
+
+
+def body_rotations(model, clip):
+    """Orientations (n, 18, 4) of the figure's bodies by MuJoCo."""
+    data = mujoco.MjData(model)
+    rotations = []
+    for pose in clip.poses:
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        rotations.append(data.xquat[1:].copy())
+    return np.array(rotations)
