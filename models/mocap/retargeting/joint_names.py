@@ -22,6 +22,7 @@ _HELPER_WORDS = frozenset((
     "twist", "roll", "helper", "corrective", "muscle", "mesh", "nub", "end", "ik", "pole", "ctrl", "target", "site",
     "marker", "tip", "part",
 ))  # fmt: skip
+_TRUNK_WORDS = frozenset(("torso", "pelvis"))
 # Least fraction of the joints that share a word of the skeleton's name: 0.25 and 0.9 name 17 captures the same way.
 _MIN_SHARED_FRACTION = 0.5
 # MikuMikuDance; longer words first.
@@ -47,8 +48,8 @@ class JointName(NamedTuple):
     bare : str
         The other words in lower case, joined: ``upperarm``.
     noisy : bool
-        Whether words such as *joint* or *stretch*, or leading underscores, are left out of `bare`: among joints with
-        the same words, one without them is more likely to be the body's.
+        Whether words such as *joint* or *stretch*, leading underscores, or another body are left out of `bare`: among
+        joints with the same words, one without them is more likely to be the body's.
     helper : bool
         Whether it is a twist, a tip, or another joint that is not part of the body.
     """
@@ -123,9 +124,11 @@ def _parse(words: list[str], sided: frozenset[str], link: bool) -> JointName:
     if not side and not _CENTRE_WORDS.issuperset(others):
         others = [word for word in others if word not in _CENTRE_WORDS]
     bare = "".join(word for word in others if word not in _NOISE_WORDS)
-    beyond_torso = bare.removeprefix("torso")  # torso_head, lTorso_Clavicle (GAMES-105): between two bodies
-    bare = beyond_torso if beyond_torso == "head" or beyond_torso in sided else bare
-    noisy, helper = link or not _NOISE_WORDS.isdisjoint(others), not _HELPER_WORDS.isdisjoint(others)
+    # torso_head, lTorso_Clavicle (GAMES-105), left_tibia_foot: a joint between two bodies moves the second one.
+    between = bare not in sided and "".join(others[:-1]) in _TRUNK_WORDS | sided and others[-1] in sided | {"head"}
+    bare = others[-1] if between else bare
+    noisy = link or between or not _NOISE_WORDS.isdisjoint(others)
+    helper = not _HELPER_WORDS.isdisjoint(others)
     if not side:
         for mark in _SIDES:
             rest = bare.removeprefix(mark)

@@ -53,6 +53,20 @@ VENDOR_RIGS = {
         "RootJoint pelvis_lowerback lowerback_torso torso_head lTorso_Clavicle lShoulder lElbow lWrist lHip lKnee "
         "lAnkle lToeJoint",
     ),
+    "joints between two bodies": (
+        """pelvis pelvis_@_femur @_femur_tibia @_tibia_foot
+        pelvis pelvis_spine1 spine1 spine2 neck
+        spine2 @_manubrium @_clavicle @_humerus @_radius""",
+        "left right",
+        "pelvis spine1 spine2 neck left_clavicle left_humerus left_radius - pelvis_left_femur left_femur_tibia "
+        "left_tibia_foot -",
+    ),
+    "links beside the joints": (
+        """Pelvis Pelvis_@_Hip @_Hip @_Knee @_Ankle
+        Pelvis Pelvis_Spine1 Spine1 Spine2 Spine3 Spine3_Neck Neck
+        Spine3 Spine3_@_Collar @_Collar @_Shoulder @_Elbow""",
+        "L R", "Pelvis Spine1 Spine3 Neck L_Collar L_Shoulder L_Elbow - L_Hip L_Knee L_Ankle -",
+    ),
     "Rigify metarig": (
         """spine spine.001 spine.002 spine.003 spine.004 spine.005 spine.006
         spine pelvis.@
