@@ -26,7 +26,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.preparation.skate import stance_slides
 from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL

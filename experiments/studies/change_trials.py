@@ -22,7 +22,7 @@ from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.motion.clip import pose_difference
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from models.world.scene import SceneConfig
 from sim.reference.reference import make_reference, reference_along
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from models.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
+from models.humanoid.skeleton import N_POSE, Pose
 from models.mocap.motion import quaternions
 
 CLOSURE_TOLERANCE = 1e-3
@@ -179,13 +179,3 @@ def pose_difference(start: Pose, end: Pose) -> Array:
     turns = quaternions.product(quaternions.conjugate(start[..., 3:].reshape(shape)), end[..., 3:].reshape(shape))
     rotation = quaternions.logarithm(turns).reshape(*start.shape[:-1], -1)
     return np.concatenate((end[..., :3] - start[..., :3], rotation), axis=-1)
-
-
-def global_rotations(poses: Array) -> Array:
-    """R_WS of the 18 segments from MuJoCo's qpos, shape (n, 75) → (n, 18, 4)."""
-    local = poses[:, 3:].reshape(len(poses), -1, 4)
-    world = local.copy()
-    for index, segment in enumerate(SEGMENTS):
-        if segment.parent >= 0:
-            world[:, index] = quaternions.product(world[:, segment.parent], local[:, index])
-    return world

@@ -6,8 +6,8 @@ from models.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.motion.spans import spans
-from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import Stances
 
 # Half or twice the first of these bounds changes the faults found in 6 and 3 of 26 clips (nine embedded clips and 17

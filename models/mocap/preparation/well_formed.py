@@ -13,7 +13,8 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, global_rotations, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
+from models.mocap.motion.kinematics import global_rotations
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import (
     MAX_END_SPEED,

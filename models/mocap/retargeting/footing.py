@@ -12,8 +12,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
 from models.arrays import Array, IntArray, Mask
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, soles
 from models.mocap.motion import quaternions
+from models.mocap.motion.kinematics import segment_positions
 
 # Largest height difference among the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
 _MAX_SOLE_RANGE = 0.06
@@ -63,7 +64,7 @@ def put_on_floor(root: Array, segments: Array, fps: float, counted: Mask | slice
     root, segments : arrays
         Positions and rotations after the shift and the rotation of the ankles.
     """
-    ankles = root[:, None, 2] + _ankle_positions(segments)[..., 2]
+    ankles = segment_positions(root, segments)[:, _FEET, 2]
     feet = segments[:, _FEET]
     points = soles().reshape(2, 4, 3)
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
@@ -77,17 +78,6 @@ def put_on_floor(root: Array, segments: Array, fps: float, counted: Mask | slice
     return root - np.array([0.0, 0.0, floor]), segments
 
 
-def _ankle_positions(segments: Array) -> Array:
-    """Positions of the ankles relative to the pelvis, in world axes [m], shape (frames, 2, 3)."""
-    model = figure_model()
-    places = np.zeros((len(segments), len(_FEET), 3))
-    for column, body in enumerate(_FEET):
-        while (parent := SEGMENTS[body].parent) >= 0:
-            places[:, column] += quaternions.rotated(segments[:, parent], model.body(BODIES[body]).pos)
-            body = parent
-    return places
-
-
 def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, float]:
     """The motion rotated so that its floor is level, and the angle [rad]; 0 where no slope can be estimated.
 
@@ -96,9 +86,8 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     root, segments, fps
         As in `put_on_floor`.
     """
-    points = (root[:, None] + _ankle_positions(segments))[:, :, None] + quaternions.rotated(
-        segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3)
-    )
+    feet = quaternions.rotated(segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3))
+    points = segment_positions(root, segments)[:, _FEET, None] + feet
     middle = points.mean(axis=2)
     lower = np.arange(len(points)), np.argmin(middle[..., 2], axis=1)
     if len(points) < 4:

@@ -7,7 +7,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, JOINTS, N_TA
 from models.mocap.dynamics.coordinates import poses
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import contact_points
+from models.mocap.motion.kinematics import contact_points
 
 PALMS = slice(len(FOOT_CONTACTS), len(ALL_CONTACTS))
 

@@ -12,11 +12,12 @@ from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.feasible import contact_forces, feasible
 from models.mocap.preparation.fidelity import MAX_JOINT_DISTANCE
 from models.mocap.preparation.looping import close_or_rest, mirrored
-from models.mocap.preparation.poses import add_tangents, resampled, sole_points
+from models.mocap.preparation.poses import add_tangents, resampled
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.skate import stance_slides
 from models.mocap.preparation.stances import stances, with_feet_at_rest
