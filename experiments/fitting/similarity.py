@@ -21,7 +21,7 @@ from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
 MAX_FOOT_SKATE = 0.02
-"""Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
+"""Largest foot skate of a blend, in 95 % of the stances, and largest slide of a lifted map's in-betweens [m]."""
 
 MAX_EXCESS_RESIDUAL = (
     0.06  # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `MAX_FOOT_SKATE`
@@ -67,8 +67,8 @@ def motion_of(poses: Array, fps: float) -> Motion:
     clip = Clip(poses, fps, "blend")
     schedule = stances(clip, smoothed(clip))
     support = contact_forces(clip, schedule)
-    slides, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
-    return Motion(support.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
+    found, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
+    return Motion(support.residual, float(lowest), float(np.quantile(found, 0.95)), float(found.max()))
 
 
 def moves_alike(made: Cylindrical, lap: float) -> bool:

@@ -52,8 +52,7 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Largest distance of a contact point, hands included, from its median place in a stance, 95th percentile over
-        stances [m].
+        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances [m].
     slid : float
         The same, largest over all stances [m].
     outliers : int
@@ -172,10 +171,10 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         if clip.n_frames > 8
         else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     )
-    slides = skates(clip, schedule, forces.loads)
+    found = skates(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
-        float(slides.max()), outliers(clip), closed,
+        clip.duration, float(low), float(high), _sole_tilt(clip, soles), float(np.quantile(found, 0.95)),
+        float(found.max()), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
         float(beyond_ranges(clip.poses).max()),
         forces.residual, forces.strain, forces.joint,

@@ -23,7 +23,7 @@ _MAX_SOLE_RANGE = 0.06
 _FLOOR_QUANTILE = 0.25
 # Largest speed of a standing sole [m/s]: with half the value one of the 28 captures of
 # docs/validation/prepared-captures.md gets a slope of 1.4°, with twice one keeps its slope.
-_MAX_STANDING_SPEED = 0.4
+MAX_STANDING_SPEED = 0.4
 _MIN_SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
 # Least number of stances: half the value changes none of 17 captures, twice leaves the slope of one of them.
 _MIN_STANCE_COUNT = 4
@@ -94,7 +94,7 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
     # Not `contacts.standing_parts`: the floor, above which a sole could be low, is not known yet.
-    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < _MAX_STANDING_SPEED)
+    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < MAX_STANDING_SPEED)
     begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also if the other foot takes over
     stances = int(begins.sum())
     slopes = (

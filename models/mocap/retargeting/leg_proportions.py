@@ -19,9 +19,10 @@ from models.arrays import Array
 from models.humanoid.skeleton import BODIES
 from models.mocap.motion.kinematics import segment_positions
 from models.mocap.retargeting.body_lines import SIDES
+from models.mocap.retargeting.footing import MAX_STANDING_SPEED
 
-# Half or twice the first and the last of these moves the hips of ten captures by at most 2 mm; the second, 5 and 16 mm.
-_MAX_STANDING_SPEED = 0.4  # largest speed of a standing ankle, as that of soles in `footing` [m/s]
+# Half or twice this height moves the hips of ten captures by 5 and 16 mm; `MAX_STANDING_SPEED` and the next value by at
+# most 2 mm.
 _WEIGHT_DECAY_HEIGHT = 0.03  # height above the lower foot at which the other one has the weight 1/e [m]
 _SMOOTHING = 0.05  # standard deviation of the Gaussian filter for the correction of the hips [s]
 # Least improvement: by how much less level the figure's stances must be than the source's [m]. Of 144 captures it is at
@@ -51,7 +52,7 @@ def hips_over_feet(root: Array, segments: Array, legs: Array, ankles: Array, fps
     heights = places[..., 2]
     lower = np.arange(len(root)), heights.argmin(axis=1)
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=2)[lower] * fps
-    stands = np.flatnonzero(speed < _MAX_STANDING_SPEED)
+    stands = np.flatnonzero(speed < MAX_STANDING_SPEED)
     if len(stands) == 0:
         return root
     weights = np.exp((heights[lower][:, None] - heights) / _WEIGHT_DECAY_HEIGHT)
