@@ -12,6 +12,7 @@ from numba import typeof, types
 from controllers.kernel_call import call_as_given
 from controllers.lent import by_pointer
 from controllers.state import Array, Mask
+from models.arrays import rms
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
@@ -263,8 +264,8 @@ def report(motion: TrackedMotion) -> TrackingReport:
         flight_seconds=period * float(np.sum(in_flight)),
         falls=tuple(falls.tolist()),
         up_seconds=period * float(np.sum(up)),
-        joint_error=float(np.rad2deg(_rms(angles))),
-        root_error=_rms(root),
+        joint_error=float(np.rad2deg(rms(angles))),
+        root_error=rms(root),
         root_error_max=float(root.max(initial=0.0)),
         residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),
         stance=residual(~in_flight),
@@ -273,7 +274,3 @@ def report(motion: TrackedMotion) -> TrackingReport:
         slide=slide.largest,
         warnings=motion.warnings,
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

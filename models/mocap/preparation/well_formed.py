@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.arrays import Array, Mask
+from models.arrays import Array, Mask, rms
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.momentum import momentum
@@ -210,8 +210,8 @@ def _seam_velocity(clip: Clip, closed: bool) -> float:
     steps = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 6:] * clip.fps
     first, last = steps[0], steps[-1]
     if closed:
-        return float(np.sqrt(np.mean((first - last) ** 2)))
-    return float(max(np.sqrt(np.mean(first**2)), np.sqrt(np.mean(last**2))))
+        return rms(first - last)
+    return max(rms(first), rms(last))
 
 
 def _gravity_deviation(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:

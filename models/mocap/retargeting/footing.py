@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array, IntArray, Mask
+from models.arrays import Array, IntArray, Mask, rms
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, soles
 from models.mocap.motion import quaternions
 from models.mocap.motion.kinematics import segment_positions
@@ -122,7 +122,7 @@ def _floor_slopes(points: Array, feet: IntArray, stances: int) -> Array:
     spread = sizes / np.sqrt(len(points))
     is_spread = np.where(spread > _MIN_SPREAD, 1.0, 0.0)
     slopes = is_spread * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
-    deviation = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
+    deviation = rms(height - flat @ directions.T @ slopes)
     # A plane fits a few stances well whatever its slope: Student's t with the remaining degrees of freedom.
     degrees = stances - len(both) - int(is_spread.sum())
     min_rise = (

@@ -84,10 +84,6 @@ def residuals(m: Measures) -> tuple[np.ndarray, np.ndarray]:
     return remainders[:, 0], remainders[:, 1]
 
 
-def rms(x: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(x))))
-
-
 def limit_excess(clip: Clip) -> float:
     """Largest excess of a joint's rotation vector over its range [rad]; negative when all are inside."""
     q = clip.poses[:, 7:].reshape(len(clip.poses), len(JOINTS), 4)
