@@ -24,10 +24,11 @@ from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
 from models.arrays import rms
 from models.humanoid.skeleton import N_POSE
+from models.mocap.motion.clip import pose_errors
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import PHANTOM
 from sim.body.figure_state import REPORT_DOWN
-from sim.loop.channels import pose_errors, tick_channels
+from sim.loop.channels import tick_channels
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 

@@ -15,7 +15,7 @@ from controllers.state import Array, Mask
 from models.arrays import rms
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
-from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_errors
 from models.mocap.motion.foot_skate import ContactSlide
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
@@ -248,9 +248,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
     falls = times[~up & np.concatenate(([True], up[:-1]))]
     in_flight, is_supported = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > MIN_GROUND_FORCE
     wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
-    difference = pose_difference(motion.poses[up], motion.reference.poses[up])
-    angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)
-    root = np.linalg.norm(difference[:, :3], axis=1)
+    joints, root = pose_errors(motion.poses[up], motion.reference.poses[up])
 
     def residual(rows: Mask) -> Residual:
         measure = ResidualMeasure(motion.weight, motion.com_height, period)
@@ -264,7 +262,7 @@ def report(motion: TrackedMotion) -> TrackingReport:
         flight_seconds=period * float(np.sum(in_flight)),
         falls=tuple(falls.tolist()),
         up_seconds=period * float(np.sum(up)),
-        joint_error=float(np.rad2deg(rms(angles))),
+        joint_error=float(np.rad2deg(rms(joints))),
         root_error=rms(root),
         root_error_max=float(root.max(initial=0.0)),
         residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),

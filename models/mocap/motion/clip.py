@@ -179,3 +179,19 @@ def pose_difference(start: Pose, end: Pose) -> Array:
     turns = quaternions.product(quaternions.conjugate(start[..., 3:].reshape(shape)), end[..., 3:].reshape(shape))
     rotation = quaternions.logarithm(turns).reshape(*start.shape[:-1], -1)
     return np.concatenate((end[..., :3] - start[..., :3], rotation), axis=-1)
+
+
+def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
+    """Pose errors: RMS over the joints of the angle between their rotations [rad], and distance of the roots [m].
+
+    Parameters
+    ----------
+    poses, reference : array, shape (n, 75)
+
+    Returns
+    -------
+    joints, root : array, shape (n,)
+    """
+    difference = pose_difference(poses, reference)
+    turns = difference[:, 6:].reshape(len(poses), -1, 3)
+    return np.sqrt(np.mean(np.sum(turns**2, axis=2), axis=1)), np.linalg.norm(difference[:, :3], axis=1)

@@ -15,9 +15,8 @@ from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.hands import edited_until
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.clip import pose_difference, pose_errors
 from models.world.scene import FIGURE
-from sim.loop.channels import pose_errors
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
