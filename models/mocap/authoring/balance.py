@@ -2,15 +2,16 @@
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from models.arrays import Array, Mask
 from models.gravity import GRAVITY
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
+from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import sole_points
 
 # Height below which a contact sphere supports the body [m], at any speed: unlike captured ones (`contacts`), authored
 # soles are exact.
@@ -61,24 +62,12 @@ def dynamics(clip: Clip) -> Dynamics:
     Dynamics
         One row for each frame but the last.
     """
-    model = figure_model()
-    data = mujoco.MjData(model)
-    pelvis = model.body("pelvis").id
-    feet = [model.geom(name).id for name in FOOT_CONTACTS]
-    velocities = clip.velocities()
-    n = len(clip.poses) - 1
-    com, momentum, contacts = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, len(feet), 3))
-    for k in range(n):
-        data.qpos, data.qvel = clip.poses[k], velocities[k]
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_comVel(model, data)
-        mujoco.mj_subtreeVel(model, data)
-        com[k], momentum[k], contacts[k] = data.subtree_com[pelvis], data.subtree_angmom[pelvis], data.geom_xpos[feet]
+    motion = momentum(clip)
+    com, angular = motion.com[:-1], motion.angular[:-1]
     acceleration = (np.roll(com, -1, axis=0) - 2 * com + np.roll(com, 1, axis=0)) * clip.fps**2
-    force = model.body_subtreemass[pelvis] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
-    torque = (np.roll(momentum, -1, axis=0) - np.roll(momentum, 1, axis=0)) * clip.fps / 2
-    return Dynamics(com, force, torque, zero_moment_point(com, force, torque), contacts)
+    force = figure_model().body_subtreemass[1] * (acceleration + np.array([0.0, 0.0, GRAVITY]))
+    torque = (np.roll(angular, -1, axis=0) - np.roll(angular, 1, axis=0)) * clip.fps / 2
+    return Dynamics(com, force, torque, zero_moment_point(com, force, torque), sole_points(clip.poses[:-1]))
 
 
 def balanced_clip(choreography: Choreography, fps: float) -> Clip:
