@@ -187,10 +187,12 @@ def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
     Parameters
     ----------
     poses, reference : array, shape (n, 75)
+        MuJoCo's qpos.
 
     Returns
     -------
     joints, root : array, shape (n,)
+        The two errors of each pose.
     """
     difference = pose_difference(poses, reference)
     turns = difference[:, 6:].reshape(len(poses), -1, 3)

@@ -25,7 +25,8 @@ class ContactSlide:
     """
 
     def __init__(self) -> None:
-        self.largest, self._origins = 0.0, dict[int, Array]()
+        self.largest = 0.0
+        self._origins: dict[int, Array] = {}
 
     def add(self, points: Array, touching: Mask) -> None:
         """Add places (n ≥ 1, k, 3) of the points [m], and whether they touch the floor (n, k), in order of time."""
