@@ -102,9 +102,7 @@ class AnimationSummary:
     def soles(self) -> str:
         """Height and slide of the soles, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        return (
-            f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most."
-        )
+        return f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most."
 
 
 @dataclass(frozen=True)
