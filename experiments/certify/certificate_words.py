@@ -91,7 +91,7 @@ WORDS: dict[str, tuple[str, str]] = {
     "floor": ("height of what stands over the floor, median", "m"),
     "lowest": ("lowest point of the body while supported, from there, 5 %", "m"),
     "highest": ("the same, 95 %", "m"),
-    "skate": ("furthest that a standing foot slides", "m"),
+    "skate": ("largest skate of a standing foot", "m"),
     "unheld": ("longest stretch without a foot at rest", "s"),
     "jump": ("largest acceleration of the centre of mass", "m/s²"),
 }

@@ -8,8 +8,8 @@ from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.spans import spans
-from models.mocap.preparation.poses import sole_points
 from sim.body.figure_state import FigureGains
 
 MAX_FLIGHT_TIME = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither

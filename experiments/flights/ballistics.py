@@ -26,8 +26,8 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.poses import sole_points
-from models.mocap.preparation.skate import stance_slides
+from models.mocap.motion.foot_skate import stance_skates
+from models.mocap.motion.kinematics import sole_points
 from sim.body.clip_motion import clip_motion
 from sim.body.figure_state import REPORT_RESIDUAL
 from sim.body.tracking import TrackingConfig, tracked_motion
@@ -116,10 +116,10 @@ def body_motion(clip: Clip) -> BodyMotion:
 def body_contact(clip: Clip) -> BodyContact:
     """Floor contact and foot skate of a clip, for the certificate's checks of the capture."""
     floor, points = contacts(clip), sole_points(clip.poses)
-    slide = float(stance_slides(points, floor.resting[:, : points.shape[1]]).max())
+    skate = float(stance_skates(points, floor.resting[:, : points.shape[1]]).max())
     turns = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 3:].reshape(clip.n_frames - 1, -1, 3)
     return BodyContact(
-        floor.clearance, floor.supported, np.any(floor.resting, axis=1), slide,
+        floor.clearance, floor.supported, np.any(floor.resting, axis=1), skate,
         np.linalg.norm(turns, axis=2).max(axis=1, initial=0.0),
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ import numpy as np
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import Link
+from models.arrays import rms
 from sim.hardware.controls import RunStatus
 from sim.hardware.servo_process import Ended, Ready
 from sim.recording.recording import Recording, RecordingError
@@ -162,7 +163,6 @@ def _summarize_recording(path: Path) -> dict[str, Any]:
         }
         rows = {name: rows[name][is_active] for name in rows if name in channels}
         sizes = {name: np.linalg.norm(rows[name], axis=1) for name in ("force", "hand_force")}
-        was_active = bool(is_active.any())
         t, fault, value = (recording.channel("ticks", name)[:] for name in ("t", "fault", "fault_value"))
         sequence, lost, refused, *times = (
             recording.channel("ticks", name)[:]
@@ -175,9 +175,9 @@ def _summarize_recording(path: Path) -> dict[str, Any]:
             "let_go": tuple(f"{t[k]:.3f} s, {Fault(int(fault[k])).words(value[k])}" for k in fault_starts),
             "recorded": len(state), "dropped": int(recording.channel("ticks", "dropped")[-1]),
             "active": float(np.sum(is_active)) / recording.rates["ticks"],
-            "distance": float(np.sqrt(np.mean(rows["distance"] ** 2))) if was_active else 0.0,
+            "distance": rms(rows["distance"]),
             "force": float(sizes["force"].max(initial=0.0)), "heat": float(rows["heat"].max(initial=0.0)),
-            "apart": float(np.sqrt(np.mean(rows["apart"] ** 2))) if was_active else 0.0,
+            "apart": rms(rows["apart"]),
             "hand_force": float(sizes["hand_force"].max(initial=0.0)),
             "link": Link.of(float(t[-1] - t[0]), counts, np.stack(times, axis=1)[new]),
         }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Measures of a motion that a map generates: joint limits, foot skate, floor penetration, flights."""
+"""Measures of a motion that a map generates: joint limits, slide of the feet, floor penetration, flights."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class MotionMeasure(NamedTuple):
     limits : float
         Excess of a joint over its limits [rad].
     slide : float
-        Foot skate (`experiments.results.measures.soles`) [m].
+        Largest slide of a point of the soles (`experiments.results.measures.soles`) [m].
     penetration : float
         Depth of the body below the floor [m].
     ballistic : float

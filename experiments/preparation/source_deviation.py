@@ -24,11 +24,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.state import Array
-from experiments.results.measures.pose_distance import segment_places
-from models.humanoid.skeleton import BODIES, figure_model
+from models.humanoid.skeleton import BODIES
 from models.mocap.library import read_motion
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import global_rotations, segment_positions
 from models.mocap.preparation.fidelity import common_frames
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.retargeting.body_lines import SIDES, body_lines, unit
@@ -153,12 +153,13 @@ def _best_heading(own: Array, others: Array) -> Array:
 
 def _figure_lines(poses: Array) -> tuple[Array, Array, Array]:
     """Middle of the figure's hips, its lines, and rotations of its feet; shapes (n, 3), (n, 11, 3), (n, 2, 4)."""
-    places = segment_places(poses, figure_model())
+    rotations = global_rotations(poses)
+    places = segment_positions(poses[:, :3], rotations)
     joints = [
         np.stack([places[:, BODIES.index(f"{side}_{part}")] for side in SIDES], axis=1)
         for part in ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
     ]
-    return joints[0].mean(axis=1), _line_vectors(*joints), global_rotations(poses)[:, _FEET]
+    return joints[0].mean(axis=1), _line_vectors(*joints), rotations[:, _FEET]
 
 
 def _line_vectors(hips: Array, knees: Array, ankles: Array, shoulders: Array, elbows: Array, wrists: Array) -> Array:

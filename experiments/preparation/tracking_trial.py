@@ -4,9 +4,7 @@ from collections.abc import Callable
 from time import process_time
 from typing import NamedTuple
 
-import numpy as np
-
-from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.motion.clip import Clip, pose_errors
 from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS, exceeding_text
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
@@ -69,7 +67,7 @@ def followed(
     began = process_time()
     motion = tracked_motion(clip, seconds, TrackingConfig(), ready)
     cost = (process_time() - began) / seconds
-    root_errors = np.linalg.norm(pose_difference(motion.poses, motion.reference.poses)[:, :3], axis=1)
+    root_errors = pose_errors(motion.poses, motion.reference.poses)[1]
     tracking = report(motion)
     fall_times = [*motion.reference.times[root_errors > MAX_ROOT_ERROR][:1].tolist(), *tracking.falls[:1]]
     return Followed(tracking.stance.force_rms, min(fall_times, default=None), seconds, cost)

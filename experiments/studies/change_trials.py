@@ -1,4 +1,4 @@
-"""Changes of river and stops at random moments: foot skate, height of the soles, and jumps of velocities.
+"""Changes of river and stops at random moments: slide and height of the soles, and jumps of velocities.
 
 ``python -m experiments.studies.change_trials CLIP CLIP CLIP...`` lets rivers play embedded clips, and prints the worst
 of many changes from one river to another, and of as many hands that are thrown off. The animation is measured at every
@@ -22,7 +22,7 @@ from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.motion.clip import pose_difference
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from models.world.scene import SceneConfig
 from sim.reference.reference import make_reference, reference_along
 
@@ -33,7 +33,7 @@ _CHANGE_DURATION, _MEASURED_TIME = 0.3, 0.8
 _THROW_DISPLACEMENT = np.array([0.1, 0.0, 0.1])  # [m] displacement of a hand that is thrown off, in the same duration
 _FIRST_MOMENT, _MOMENT_RANGE = 1.2, 3.0  # [s] earliest moment, and range of the moments
 _TRIAL_COUNT, _SEED = 200, 11  # of random moments
-_MAX_SKATE = 0.03  # [m] foot skate above which a change counts as a slide
+_MAX_SLIDE = 0.03  # [m] slide above which a change is counted
 
 
 class Change(NamedTuple):
@@ -42,7 +42,7 @@ class Change(NamedTuple):
     Attributes
     ----------
     slide, height, depth : float
-        Foot skate of a point of a sole, height of the lowest point, and its depth below the floor [m].
+        Slide of a point of a sole, height of the lowest point, and its depth below the floor [m].
     over, up, joint : float
         Jumps of the root's horizontal and vertical velocity [m/s], and of a joint's velocity [rad/s].
     """
@@ -113,7 +113,7 @@ def main(arguments: list[str]) -> None:
         slide, height, depth, over, up, joint = found.max(axis=0)
         median, most = np.quantile(found[:, 5], [0.5, 0.9])
         print(f"{_TRIAL_COUNT} {'stops' if stops else 'changes'}")
-        print(f"  slide {100 * slide:.1f} cm, {(found[:, 0] > _MAX_SKATE).sum()} of them more than 3 cm")
+        print(f"  slide {100 * slide:.1f} cm, {(found[:, 0] > _MAX_SLIDE).sum()} of them more than 3 cm")
         print(f"  in the air {100 * height:.1f} cm, below the floor {100 * depth:.1f} cm")
         print(f"  leaps of the root {over:.2f} m/s over the ground, {up:.2f} m/s up")
         print(f"  leaps of joints {joint:.0f} rad/s, median {median:.1f}, nine of ten at most {most:.1f}")

@@ -31,6 +31,7 @@ from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
+from models.arrays import rms
 from models.errors import ModelError
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
@@ -138,10 +139,10 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "share": getattr(session.parts.maps.haptic_map, "share", None),
         "remarks": session.remarks, "fell": fell,
         "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing),
-        "residual": float(np.sqrt(np.mean(force**2))), "peak": float(force.max()),
+        "residual": rms(force), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,
-        "worst": [round(float(100 * np.sqrt(np.mean(part**2)))) for part in np.array_split(force, 10)],
+        "worst": [round(100 * rms(part)) for part in np.array_split(force, 10)],
         **animation_measures(frames["reference"][::_STRIDE], rate / _STRIDE), "cpu": time.process_time() - began,
     }  # fmt: skip
 

@@ -17,6 +17,7 @@ from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
+from models.arrays import rms
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.library import embedded_names
 from models.mocap.motion.clip import Clip
@@ -67,7 +68,7 @@ def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: flo
         fell += int(not up.all())
         stance = up & (frames["flight"] == 0.0)
         size = np.array([_norms(frames["residual"][:, :3]), _norms(frames["residual"][:, 3:])]) / measure[:, None]
-        residuals.append(float(np.sqrt(np.mean(size[0, stance] ** 2))))
+        residuals.append(rms(size[0, stance]))
         most = np.maximum(most, size[:, up].max(axis=1))
     found = f"{100 * np.median(residuals):.1f} %, {100 * most[0]:.0f} % and {100 * most[1]:.0f} %"
     return f"{fell} of {len(NUDGES)}, {found}" if fell else found

@@ -22,11 +22,13 @@ from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
+from models.arrays import rms
 from models.humanoid.skeleton import N_POSE
+from models.mocap.motion.clip import pose_errors
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import PHANTOM
 from sim.body.figure_state import REPORT_DOWN
-from sim.loop.channels import pose_errors, tick_channels
+from sim.loop.channels import tick_channels
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 
@@ -102,14 +104,14 @@ def course(config: RunConfig, step: float) -> Course:
 
 def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     """A line of the table."""
-    apart, force = 1e6 * _rms(coarse.p - fine.p), 100.0 * _rms(coarse.force - fine.force) / _rms(fine.force)
-    path = 1e6 * _rms(off_path(coarse.p, fine.p))
+    apart, path = (1e6 * _rms_norm(difference) for difference in (coarse.p - fine.p, off_path(coarse.p, fine.p)))
+    force = 100.0 * _rms_norm(coarse.force - fine.force) / _rms_norm(fine.force)
     band = butter(2, BAND, fs=1.0 / coarse.period, output="sos")
     slow, finer = (np.asarray(sosfiltfilt(band, c.force, axis=0)) for c in (coarse, fine))
     off = ", ".join(f"{np.rad2deg(_pose_error(c.poses, c.reference)):.2f}" for c in (coarse, fine))
     return (
         f"| {name} | {1e3 * step:g} | {path:.1f}, {apart:.1f} | "
-        f"{100.0 * _rms(slow - finer) / _rms(finer):.2g}, {force:.0f} | {1e6 * coarse.gap:.2g} | "
+        f"{100.0 * _rms_norm(slow - finer) / _rms_norm(finer):.2g}, {force:.0f} | {1e6 * coarse.gap:.2g} | "
         f"{np.rad2deg(_pose_error(coarse.poses, fine.poses)):.2f} | {off} | "
         f"{coarse.falls}, {fine.falls} |"
     )
@@ -137,11 +139,11 @@ def off_path(p: Array, other: Array) -> Array:
 def _pose_error(poses: Array, others: Array) -> float:
     """RMS over joints and time of the angle between poses of a figure, or between an arm's angles [rad]."""
     if poses.shape[1] != N_POSE:
-        return float(np.sqrt(np.mean((poses - others) ** 2)))
-    return float(np.sqrt(np.mean(pose_errors(poses, others)[0] ** 2)))
+        return rms(poses - others)
+    return rms(pose_errors(poses, others)[0])
 
 
-def _rms(rows: Array) -> float:
+def _rms_norm(rows: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(rows**2, axis=1))))
 
 

@@ -35,7 +35,8 @@ def cone_edges(point: Array, friction: float, edges: Array) -> None:
     point : Array
         Point of contact, relative to the origin of moments, shape (3,) [m]; the floor's normal is z.
     friction : float
-        Coefficient μ; the edges lie along ±x and ±y, inside the round cone.
+        Coefficient μ; the edges lie on the round cone along ±x and ±y, and in between the pyramid is inside it. The
+        pyramids by which motions are prepared are turned by 45° (`models.mocap.dynamics.floor_forces`).
     edges : Array
         Result, shape (4, 6): force, then moment point × force.
     """

@@ -19,7 +19,7 @@ from controllers.work_array import work_array
 from sim.body.cholesky import factor, substitute
 
 # κ, weight of contact points at rest against small δ. Half or twice the value changes the residual of walk, run and
-# jump by at most 0.1 % of weight; foot skate is about the same.
+# jump by at most 0.1 % of weight; the slide of feet is about the same.
 _CONTACT_WEIGHT = 300.0
 # η [1/s], rate at which a foot comes to rest on the floor. Half or twice the value changes the residual of walk, run
 # and jump by at most 0.1 % of weight.

@@ -1,4 +1,4 @@
-"""A clip tracked by the physical figure alone, without Phantom: tracking errors, residual, foot skate, falls."""
+"""A clip tracked by the physical figure alone, without Phantom: tracking errors, residual, slide of the feet, falls."""
 
 import math
 from collections.abc import Callable
@@ -12,10 +12,11 @@ from numba import typeof, types
 from controllers.kernel_call import call_as_given
 from controllers.lent import by_pointer
 from controllers.state import Array, Mask
+from models.arrays import rms
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
-from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
-from models.mocap.motion.spans import spans
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_errors
+from models.mocap.motion.foot_skate import ContactSlide
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
@@ -122,7 +123,7 @@ class TrackingReport:
     grounded : float
         Share of the reference's time out of flight in which the ground supports the figure.
     slide : float
-        Foot skate: largest distance that a contact point slid over the floor while in contact [m].
+        Largest slide of a contact point over the floor (`models.mocap.motion.foot_skate`) [m].
     warnings : int
         Number of MuJoCo's warnings.
     """
@@ -247,43 +248,27 @@ def report(motion: TrackedMotion) -> TrackingReport:
     falls = times[~up & np.concatenate(([True], up[:-1]))]
     in_flight, is_supported = motion.reports[:, REPORT_FLIES] == 1.0, motion.ground[:, 2] > MIN_GROUND_FORCE
     wrench = motion.reports[:, REPORT_RESIDUAL : REPORT_RESIDUAL + 6]
-    difference = pose_difference(motion.poses[up], motion.reference.poses[up])
-    angles = np.linalg.norm(difference[:, 6:].reshape(len(difference), -1, 3), axis=-1)
-    root = np.linalg.norm(difference[:, :3], axis=1)
-    touches: Mask = np.less(motion.contacts[:, :, 2], 0.0) & up[:, None]
+    joints, root = pose_errors(motion.poses[up], motion.reference.poses[up])
 
     def residual(rows: Mask) -> Residual:
         measure = ResidualMeasure(motion.weight, motion.com_height, period)
         measure.add(wrench[up & rows & (times <= motion.ends)])
         return measure.summary()
 
-    on_ground = up & ~in_flight
+    on_ground, slide = up & ~in_flight, ContactSlide()
+    slide.add(motion.contacts, np.less(motion.contacts[:, :, 2], 0.0) & up[:, None])
     return TrackingReport(
         seconds=period * len(times),
         flight_seconds=period * float(np.sum(in_flight)),
         falls=tuple(falls.tolist()),
         up_seconds=period * float(np.sum(up)),
-        joint_error=float(np.rad2deg(_rms(angles))),
-        root_error=_rms(root),
+        joint_error=float(np.rad2deg(rms(joints))),
+        root_error=rms(root),
         root_error_max=float(root.max(initial=0.0)),
         residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),
         stance=residual(~in_flight),
         without_ground_force=residual(~is_supported),
         grounded=float(np.mean(is_supported[on_ground])) if on_ground.any() else 1.0,
-        slide=_largest_slide(motion.contacts, touches),
+        slide=slide.largest,
         warnings=motion.warnings,
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
-
-
-def _largest_slide(contacts: Array, touches: Mask) -> float:
-    """Largest horizontal distance of a point in contact from where the contact began [m]."""
-    largest = 0.0
-    for point, touch in zip(np.moveaxis(contacts, 1, 0), touches.T, strict=True):
-        for start, end in spans(touch):
-            path = point[start:end, :2]
-            largest = max(largest, float(np.linalg.norm(path - path[0], axis=1).max()))
-    return largest

@@ -17,7 +17,7 @@ from controllers.state import (
     Array,
 )
 from models.humanoid.skeleton import N_POSE
-from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.clip import pose_errors
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
 from sim.body.robot import RobotState, tool_positions
 from sim.body.unsimulated import KinematicFigure, NoFigure
@@ -136,21 +136,3 @@ def frame_channels(frames: FrameLog, m: int, root: int) -> dict[str, Array]:
         "ground": frames.ground[:m], "flight": report[:, REPORT_FLIES], "down": report[:, REPORT_DOWN],
         "saturated": report[:, REPORT_SATURATED],
     }  # fmt: skip
-
-
-def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
-    """Pose errors: RMS over the joints of the angle between their rotations [rad], and distance of the roots [m].
-
-    Parameters
-    ----------
-    poses, reference : Array
-        Shape (n, 75) each.
-
-    Returns
-    -------
-    joints, root : Array
-        Shape (n,) each.
-    """
-    difference = pose_difference(poses, reference)
-    turns = difference[:, 6:].reshape(len(poses), -1, 3)
-    return np.sqrt(np.mean(np.sum(turns**2, axis=2), axis=1)), np.linalg.norm(difference[:, :3], axis=1)

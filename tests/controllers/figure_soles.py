@@ -1,32 +1,18 @@
-"""Positions of a figure's sole points and how far they slide, by MuJoCo's kinematics."""
+"""Positions of a figure's sole points and how far they slide."""
 
-import mujoco
-import numpy as np
-
+from controllers.legs.sole_heights import STANCE_HEIGHT
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
+from models.mocap.motion.foot_skate import ContactSlide
+from models.mocap.motion.kinematics import contact_points
 
 
 def soles(figure, poses):
     """Positions [m] of the contact points, shape (poses, points, 3)."""
-    data, geoms = mujoco.MjData(figure), [figure.geom(name).id for name in FOOT_CONTACTS]
-    positions = []
-    for pose in poses:
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(figure, data)
-        positions.append(data.geom_xpos[geoms] - [0.0, 0.0, CONTACT_RADIUS])
-    return np.array(positions)
+    return contact_points(poses, FOOT_CONTACTS, figure) - [0.0, 0.0, CONTACT_RADIUS]
 
 
-def slide(positions, touch=0.003):
-    """Largest distance [m] that a point moves over the floor while it is lower than `touch`."""
-    worst = 0.0
-    for point in range(positions.shape[1]):
-        touchdown = None
-        for position in positions[:, point]:
-            if position[2] >= touch:
-                touchdown = None
-            elif touchdown is None:
-                touchdown = position[:2]
-            else:
-                worst = max(worst, float(np.hypot(*(position[:2] - touchdown))))
-    return worst
+def slide(positions, touch=STANCE_HEIGHT):
+    """Largest slide [m] of a point that is lower than `touch`."""
+    found = ContactSlide()
+    found.add(positions, positions[..., 2] < touch)
+    return found.largest

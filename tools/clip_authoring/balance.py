@@ -10,7 +10,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from tools.clip_authoring.key_poses import Choreography, poses_at
 
 # Height below which a contact sphere supports the body [m], at any speed: unlike captured ones (`contacts`), authored

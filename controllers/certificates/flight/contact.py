@@ -5,7 +5,7 @@ That is enough to find flights, but does not prove contact. So a certificate als
 
 - the floor level, the median height of the body's lowest point while supported, is near z = 0;
 - for 90 % of the supported time that point is within a tolerance of the floor level, above and below;
-- some contact is at rest most of the time, and no resting contact slides far: friction does not hold a gliding body;
+- some contact is at rest most of the time, and no resting contact skates far: friction does not hold a gliding body;
 - the centre of mass accelerates no more than legs can push; with d the noise of the recorded centre of mass,
 
 .. math:: |\ddot c| \le a_{max} + 4 d f^2, \quad \ddot c \text{ by second differences at } f \text{ frames a second};
@@ -33,7 +33,7 @@ class BodyContact:
     supported, held : array of bool, shape (n,)
         Whether any contact bears load, and whether any of these contacts is at rest.
     skate : float
-        Largest slide (foot skate) of a foot's contact point while it counts as at rest [m].
+        Largest distance of a foot's contact point from its median place while it counts as at rest [m].
     turned : array, shape (n − 1,)
         Largest rotation of a joint from frame to frame [rad].
     """
@@ -69,7 +69,7 @@ def contact_doubts(
     if unheld > tolerance.unheld:
         doubts.append(f"for {unheld:.2f} s it is low and nothing of it is at rest, longer than {tolerance.unheld:g}")
     if touched.skate > tolerance.skate:
-        doubts.append(f"a foot that stands slides by {100 * touched.skate:.2f} cm, more than {100 * tolerance.skate:g}")
+        doubts.append(f"a foot that stands skates by {100 * touched.skate:.2f} cm, more than {100 * tolerance.skate:g}")
     return doubts + _jump_doubts(touched, com, fps, tolerance, figures), figures
 
 

@@ -56,7 +56,7 @@ class ContactTolerance:
     """Tolerances of contacts between flights.
 
     Chosen on 22 retargeted captures. In the six with real jumps, soles in stance are within 5 mm of the floor and stay
-    within 17 mm of that height, a foot slides by up to 7 cm, and for up to 0.19 s no contact is at rest.
+    within 17 mm of that height, a foot skates by up to 7 cm, and for up to 0.19 s no contact is at rest.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class ContactTolerance:
     unheld : float
         Longest time for which no contact is at rest [s].
     skate : float
-        Largest slide of a foot in a stance [m].
+        Largest skate of a foot in a stance [m].
     push : float
         Largest acceleration of the centre of mass [m/s²]; legs can give about ten times g.
     leap, outlier : float

@@ -16,6 +16,7 @@ from experiments.live.panels.run_panel import configuration_text
 from experiments.live.session.desk import Desk
 from experiments.live.session.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
+from models.arrays import rms
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.viewer.take_ghosts import COLORS, TakeGhosts
@@ -177,7 +178,7 @@ def _padded(values: np.ndarray, n: int) -> np.ndarray:
 def _legend(takes: tuple[TakeData, ...]) -> str:
     lines = [
         f'<b style="color:{color}">{take.name}</b>: {take.times[-1]:.1f} s, {np.mean(take.force):.2f} N and '
-        f"{1e3 * np.sqrt(np.mean(take.distance**2)):.1f} mm from the curve RMS"
+        f"{1e3 * rms(take.distance):.1f} mm from the curve RMS"
         for take, color in zip(takes, COLORS, strict=False)
     ]
     return "".join(f'<p style="margin:.3rem .75rem;font-size:.8rem">{line}</p>' for line in lines)

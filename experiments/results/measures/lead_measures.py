@@ -34,8 +34,8 @@ class LeadSummary:
     force_max : float
         Largest force of the field in the horizontal plane [N].
     slide_cm, physical_slide_cm : float
-        Foot skate: largest distance that a point of the animation's soles slid while in contact; the same for the
-        physical figure's soles, until its first fall.
+        Largest slide of a point of the animation's soles while in contact (`Soles`); the same for the physical
+        figure's soles, until its first fall.
     retrace_cm, retrace_deg : float or None
         On the way back, largest distance and yaw difference of the animation's root from its outward path; None if it
         never went back.

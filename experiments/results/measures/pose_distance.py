@@ -4,9 +4,8 @@ import mujoco
 import numpy as np
 
 from controllers.state import Array
-from models.humanoid.skeleton import BODIES, SEGMENTS
-from models.mocap.motion import quaternions
-from models.mocap.motion.clip import global_rotations, pose_difference
+from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.kinematics import global_rotations, segment_positions
 
 METRE = 1.0  # [rad/m] weight of the root's displacement in the product metric
 
@@ -26,18 +25,6 @@ def geodesic_distance(poses: Array, others: Array) -> Array:
 
 def seen_distance(poses: Array, others: Array, figure: mujoco.MjModel) -> Array:
     """RMS over the 18 segments of the distance between their origins in space, shapes (n, 75) → (n,) [m]."""
-    apart = segment_places(poses, figure) - segment_places(others, figure)
+    places = [segment_positions(each[:, :3], global_rotations(each), figure) for each in (poses, others)]
+    apart = places[0] - places[1]
     return np.sqrt(np.mean(np.sum(apart**2, axis=2), axis=1))
-
-
-def segment_places(poses: Array, figure: mujoco.MjModel) -> Array:
-    """Origins of the 18 segments in W by vectorised forward kinematics, shapes (n, 75) → (n, 18, 3) [m]."""
-    rotations = global_rotations(poses)
-    places = np.empty((len(poses), len(SEGMENTS), 3))
-    for index, segment in enumerate(SEGMENTS):
-        if segment.parent < 0:
-            places[:, index] = poses[:, :3]
-            continue
-        offset = np.broadcast_to(figure.body(BODIES[index]).pos, (len(poses), 3))
-        places[:, index] = places[:, segment.parent] + quaternions.rotated(rotations[:, segment.parent], offset)
-    return places

@@ -1,11 +1,10 @@
-"""Foot skate and lowest height of the soles, measured from blocks of poses."""
-
-import mujoco
-import numpy as np
+"""Slide and lowest height of the soles, measured from blocks of poses."""
 
 from controllers.legs.sole_heights import STANCE_HEIGHT
 from controllers.state import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
+from models.mocap.motion.foot_skate import ContactSlide
+from models.mocap.motion.kinematics import contact_points
 from models.world.scene import SceneConfig
 
 
@@ -14,32 +13,26 @@ class Soles:
 
     Attributes
     ----------
-    slide : float
-        Foot skate: largest horizontal distance of a point from where its contact began [m].
     lowest : float
         Least height of a point above the floor [m]; infinite before the first pose.
     """
 
     def __init__(self, scene: SceneConfig, touch: float = STANCE_HEIGHT):
-        self._contact_height = touch
+        self._contact_height, self._slide = touch, ContactSlide()
         self._model = figure_model(scene.stature, scene.mass)
-        self._data = mujoco.MjData(self._model)
-        self._geoms = [int(self._model.geom(name).id) for name in FOOT_CONTACTS]
         self._radius = CONTACT_RADIUS * scene.stature / DEFAULT_STATURE
-        self._contact_origin = np.full((len(self._geoms), 2), np.nan)
-        self.slide, self.lowest = 0.0, float("inf")
+        self.lowest = float("inf")
+
+    @property
+    def slide(self) -> float:
+        """Largest slide of a point (`models.mocap.motion.foot_skate`) [m]."""
+        return self._slide.largest
 
     def add(self, poses: Array) -> None:
         """Add poses, shape (n, 75), in order of time."""
-        for pose in poses:
-            self._data.qpos[:] = pose
-            mujoco.mj_kinematics(self._model, self._data)
-            places = self._data.geom_xpos[self._geoms]
-            height = places[:, 2] - self._radius
-            self.lowest = min(self.lowest, float(height.min()))
-            touching = height < self._contact_height
-            starting = touching & np.isnan(self._contact_origin[:, 0])
-            self._contact_origin[starting] = places[starting, :2]
-            self._contact_origin[~touching] = np.nan
-            slid = np.linalg.norm(places[:, :2] - self._contact_origin, axis=1)
-            self.slide = max(self.slide, float(np.max(slid[touching], initial=0.0)))
+        if len(poses) == 0:
+            return
+        places = contact_points(poses, FOOT_CONTACTS, self._model)
+        heights = places[:, :, 2] - self._radius
+        self.lowest = min(self.lowest, float(heights.min()))
+        self._slide.add(places, heights < self._contact_height)

@@ -91,7 +91,7 @@ class AnimationSummary:
     lowest_sole_cm : float
         Least height of a point of the soles above the floor.
     foot_skate_cm : float
-        Largest distance that a point of the soles slides while it is within 3 mm of the floor.
+        Largest slide of a point of the soles while it is within 3 mm of the floor (`models.mocap.motion.foot_skate`).
     """
 
     pushed_deg: float
@@ -100,9 +100,9 @@ class AnimationSummary:
     foot_skate_cm: float = 0.0
 
     def soles(self) -> str:
-        """Height and skate of the soles, in a sentence."""
+        """Height and slide of the soles, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        return f"The animation's lowest sole is at {lowest:+.1f} cm; feet skate {self.foot_skate_cm:.1f} cm at most."
+        return f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most."
 
 
 @dataclass(frozen=True)

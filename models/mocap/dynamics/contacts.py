@@ -39,8 +39,8 @@ _ROOT_SPEED_FRACTION = 0.3
 # captures (in one capture 9 %, if stances of up to 0.12 s are dropped).
 _MAX_TOE_HEIGHT, _MAX_TOE_SPEED = 0.10, 0.15  # [m], [m/s]: of toes that stand beside a standing heel
 MAX_FILLED_GAP, MIN_STANCE_TIME = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
-# Largest height of a settled foot above the median of its stance [m]. Half or twice the value changes the foot skate in
-# leading by 0.7 cm.
+# Largest height of a settled foot above the median of its stance [m]. Half or twice the value changes the slide of feet
+# in leading by 0.7 cm.
 _MAX_SETTLED_RISE = 0.005
 # A part below this height [m] and vertical speed [m/s] slides over the floor. Half the height changes whether the body
 # is supported in 1.2 % of these frames, twice the height in 0.2 %; half or twice the speed in 0.6 %.

@@ -6,6 +6,13 @@ w is the wrench about the centre of mass that the Newton–Euler equations of th
 M q̈ + c), the columns of A are the wrenches of unit forces along the edges of the standing spheres' friction pyramids, S
 weighs moments against forces, and r is the **residual wrench**. Everything works on batches of m states, with the k = 8
 contact spheres of the feet, or with those and the 2 of the palms, k = 10.
+
+The pyramids' edges lie on the round cone, along the diagonals of x and y. Those of the tracking controller
+(`sim.body.contact_forces`) lie along x and y, on a cone 0.9 times as wide. Either direction would do for both: with its
+directions here, the residuals of three prepared captures and of the embedded clips change by at most 0.1 % of body
+weight, and torques by at most 3 % of their limits. With these directions there, the residual of the jump is 3.2 % of
+weight instead of 2.9, that of the run 1.5 instead of 1.7, and those of six other clips the same to 0.02; the backflip
+on repeat falls either way.
 """
 
 from typing import NamedTuple

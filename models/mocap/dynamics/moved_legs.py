@@ -5,7 +5,7 @@ import numpy as np
 from models.arrays import Array
 from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import global_rotations
+from models.mocap.motion.kinematics import global_rotations, segment_positions
 
 _MAX_REACH_RATIO = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°
 _CHAINS = tuple(
@@ -16,11 +16,8 @@ _CHAINS = tuple(
 def hip_to_ankle(poses: Array) -> tuple[Array, float]:
     """Vectors from hips to ankles in the world [m], shape (n, 2, 3), and the length of a straight leg [m]."""
     thigh, shank = _leg_bones()
-    segments = global_rotations(poses)
-    lines = [
-        quaternions.rotated(segments[:, first], thigh) + quaternions.rotated(segments[:, second], shank)
-        for first, second, _ in _CHAINS
-    ]
+    joints = segment_positions(poses[:, :3], global_rotations(poses))
+    lines = [joints[:, foot] - joints[:, hip] for hip, _, foot in _CHAINS]
     return np.stack(lines, axis=1), float(np.linalg.norm(thigh) + np.linalg.norm(shank))
 
 

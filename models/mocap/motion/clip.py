@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from models.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import N_POSE, SEGMENTS, Pose
+from models.humanoid.skeleton import N_POSE, Pose
 from models.mocap.motion import quaternions
 
 CLOSURE_TOLERANCE = 1e-3
@@ -181,11 +181,19 @@ def pose_difference(start: Pose, end: Pose) -> Array:
     return np.concatenate((end[..., :3] - start[..., :3], rotation), axis=-1)
 
 
-def global_rotations(poses: Array) -> Array:
-    """R_WS of the 18 segments from MuJoCo's qpos, shape (n, 75) → (n, 18, 4)."""
-    local = poses[:, 3:].reshape(len(poses), -1, 4)
-    world = local.copy()
-    for index, segment in enumerate(SEGMENTS):
-        if segment.parent >= 0:
-            world[:, index] = quaternions.product(world[:, segment.parent], local[:, index])
-    return world
+def pose_errors(poses: Array, reference: Array) -> tuple[Array, Array]:
+    """Pose errors: RMS over the joints of the angle between their rotations [rad], and distance of the roots [m].
+
+    Parameters
+    ----------
+    poses, reference : array, shape (n, 75)
+        MuJoCo's qpos.
+
+    Returns
+    -------
+    joints, root : array, shape (n,)
+        The two errors of each pose.
+    """
+    difference = pose_difference(poses, reference)
+    turns = difference[:, 6:].reshape(len(poses), -1, 3)
+    return np.sqrt(np.mean(np.sum(turns**2, axis=2), axis=1)), np.linalg.norm(difference[:, :3], axis=1)

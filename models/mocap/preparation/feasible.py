@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array, Mask
+from models.arrays import Array, Mask, rms
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
 from models.mocap.motion import quaternions
@@ -175,16 +175,12 @@ def feasible(
     force = np.linalg.norm(problem.errors(x, False).residual[:, :3], axis=1) / problem.floor.body_weight
     return Feasible(
         change.changed(points, fps),
-        _rms(force),
-        _rms(np.linalg.norm(sizes[:, :2], axis=1)),
-        _rms(sizes[:, 2]),
-        _rms(turns),
+        rms(force),
+        rms(np.linalg.norm(sizes[:, :2], axis=1)),
+        rms(sizes[:, 2]),
+        rms(turns),
         tuple(costs),
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 class _Problem:
@@ -364,5 +360,5 @@ def contact_forces(clip: Clip, schedule: Stances, passage: bool = False) -> Cont
     frames = np.arange(clip.n_frames) / clip.fps
     loads = np.column_stack([np.interp(frames, change.times, force) for force in forces.T])
     torque_ratios = np.abs(errors.torque_ratio).max(axis=0)
-    residual = _rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
+    residual = rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
     return ContactForces(residual, loads, float(torque_ratios.max()), JOINTS[int(torque_ratios.argmax()) // 3])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array
+from models.arrays import Array, rms
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.motion.quaternions import rotated
@@ -107,7 +107,7 @@ def fidelity(clip: Clip, captured: Clip, part: LoopedClip, pace: float) -> Fidel
     instants = (clip_frames.start + angles.argmax(axis=0)) / clip.fps
     largest = np.argsort(-angles.max(axis=0))[:_LISTED_COUNT]
     return Fidelity(
-        float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(over_floor**2 + height**2))),
+        rms(angles), rms(np.hypot(over_floor, height)),
         tuple(WorstJoint(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in largest),
         clip.closes() and not clip.turns_over
         and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _MIN_GAIT_TRAVEL),

@@ -17,9 +17,10 @@ from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.laps import best_lap, frame_distances
-from models.mocap.preparation.poses import add_tangents, smoothed, sole_points
+from models.mocap.preparation.poses import add_tangents, smoothed
 from models.mocap.preparation.stances import stances
 
 # Largest d between the ends of a gait cycle, and of a cycle in place [rad]; walks have 0.1 to 0.3. Half the first loops

@@ -20,9 +20,9 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import MAX_FLIGHT_ACCELERATION_ERROR
-from models.mocap.preparation.poses import contact_points
 
 # Least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand. Half the value slows
 # SNU's run to 0.85 of its pace; twice changes no pace of 17 captures by more than 0.03.

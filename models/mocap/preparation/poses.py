@@ -1,11 +1,9 @@
-"""Operations on poses: adding tangents, resampling, low-pass filtering, periodic extension; positions of the soles."""
+"""Operations on poses: adding tangents, resampling, low-pass filtering, periodic extension."""
 
-import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from models.arrays import Array
-from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
 from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 
@@ -79,21 +77,3 @@ def with_neighbours(clip: Clip, smooth: Clip) -> tuple[Array, Array, int]:
         return clip.poses, smooth.poses, 0
     poses, first = extend_periodically(clip, clip.n_frames)
     return poses, extend_periodically(smooth, clip.n_frames)[0], first
-
-
-def sole_points(poses: Array) -> Array:
-    """Centres of the 8 contact spheres of the feet in the world [m], shape (n, 8, 3)."""
-    return contact_points(poses, FOOT_CONTACTS)
-
-
-def contact_points(poses: Array, names: tuple[str, ...]) -> Array:
-    """Centres of named contact spheres in the world [m], shape (n, k, 3)."""
-    model = figure_model()
-    data = mujoco.MjData(model)
-    spheres = [int(model.geom(name).id) for name in names]
-    points = np.empty((len(poses), len(spheres), 3))
-    for k, pose in enumerate(poses):
-        data.qpos = pose
-        mujoco.mj_kinematics(model, data)
-        points[k] = data.geom_xpos[spheres]
-    return points

@@ -13,13 +13,14 @@ from models.errors import ModelError
 from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest
 from models.mocap.preparation.pace import Paced, correct_pace
-from models.mocap.preparation.poses import contact_points, resampled, smoothed
+from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.root_path import without_foot_sliding
 from models.mocap.preparation.stances import Stances, stances, with_feet_at_rest
 from models.mocap.retargeting.hints import Hints

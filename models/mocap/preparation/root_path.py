@@ -16,7 +16,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import sole_points, with_neighbours
+from models.mocap.motion.kinematics import sole_points
+from models.mocap.preparation.poses import with_neighbours
 from models.mocap.preparation.stances import sliding_spheres
 
 # σ [s]: about a frame of 30 Hz captures; the optimisation of the dynamics smooths further. With half and twice the

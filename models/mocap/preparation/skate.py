@@ -1,13 +1,13 @@
-"""Foot skate: how far contact points move while they stand."""
+"""Foot skate of a clip: in the stances of its contact schedule."""
 
 import numpy as np
 
-from models.arrays import Array, Mask
+from models.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
-from models.mocap.motion.spans import spans
-from models.mocap.preparation.poses import contact_points
+from models.mocap.motion.foot_skate import stance_skates
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.preparation.stances import Stances
 
 # Half or twice the first of these bounds changes the faults found in 6 and 3 of 26 clips (nine embedded clips and 17
@@ -18,12 +18,10 @@ _MAX_FLOOR_HEIGHT = 0.015  # height above which a contact point does not skate [
 
 
 def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
-    r"""Largest distance of each contact point from its median place in each of its stances [m]; 0 without one.
+    """Skate of each contact point in each of its stances (`models.mocap.motion.foot_skate`) [m]; 0 without one.
 
-    .. math:: s = \max_t \lVert x(t) - \operatorname{med}_\tau x(\tau) \rVert
-
-    with :math:`x` the place of the point on the floor. A point that bears less than 2 % of the body's weight while it
-    moves by more than 0.2 m/s is in swing, however low: a toe that rolls off, or a foot in a low hop.
+    A point that bears less than 2 % of the body's weight while it moves by more than 0.2 m/s is in swing, however low:
+    a toe that rolls off, or a foot in a low hop.
 
     Parameters
     ----------
@@ -36,7 +34,7 @@ def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
     points, speeds = moving_points(clip, schedule)
     low = points[:, :, 2] - CONTACT_RADIUS < _MAX_FLOOR_HEIGHT
     swinging = (loads < _MIN_LOAD) & (speeds > MAX_REST_SPEED)
-    return stance_slides(points, schedule.standing & low & ~swinging)
+    return stance_skates(points, schedule.standing & low & ~swinging)
 
 
 def moving_points(clip: Clip, schedule: Stances) -> tuple[Array, Array]:
@@ -45,13 +43,3 @@ def moving_points(clip: Clip, schedule: Stances) -> tuple[Array, Array]:
     if clip.n_frames < 2:
         return points, np.zeros(points.shape[:2])
     return points, np.linalg.norm(np.gradient(points, axis=0), axis=2) * clip.fps
-
-
-def stance_slides(points: Array, standing: Mask) -> Array:
-    """Largest distance of contact points (n, k, 3) from their median place in each stance [m]; 0 without one."""
-    slides = [0.0]
-    for sphere, mask in enumerate(standing.T):
-        for start, end in spans(mask):
-            places = points[start:end, sphere, :2]
-            slides.append(float(np.linalg.norm(places - np.median(places, axis=0), axis=1).max()))
-    return np.array(slides if len(slides) == 1 else slides[1:])

@@ -21,11 +21,12 @@ from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points, global_rotations, sole_points
 from models.mocap.motion.spans import cleaned, spans
 from models.mocap.preparation.foot_places import MIN_LOAD, flat_sole, foot_turns, place_foot
 from models.mocap.preparation.hand_stances import extend_hand_stances, loaded_hands
-from models.mocap.preparation.poses import contact_points, sole_points, with_neighbours
+from models.mocap.preparation.poses import with_neighbours
 
 LOAD_DELAY = 0.012  # a sphere stands for this time before and after it bears load [s]: no force without contact
 # Half or twice any of the next values, down to `_LOAD_SMOOTHING`, changes whether a sphere stands in at most 0.9 % of

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.arrays import Array, Mask
+from models.arrays import Array, Mask, rms
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, global_rotations, pose_difference
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
+from models.mocap.motion.kinematics import global_rotations
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import (
     MAX_END_SPEED,
@@ -54,8 +55,7 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Largest distance of a contact point, hands included, from its median place in a stance, 95th percentile over
-        stances [m].
+        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances [m].
     slid : float
         The same, largest over all stances [m].
     outliers : int
@@ -181,10 +181,10 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         if clip.n_frames > 8
         else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     )
-    slides = skates(clip, schedule, forces.loads)
+    found = skates(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles), float(np.quantile(slides, 0.95)),
-        float(slides.max()), outliers(clip), closed,
+        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles), float(np.quantile(found, 0.95)),
+        float(found.max()), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
         float(beyond_ranges(clip.poses).max()),
         forces.residual, forces.strain, forces.joint,
@@ -220,8 +220,8 @@ def _seam_velocity(clip: Clip, closed: bool) -> float:
     steps = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 6:] * clip.fps
     first, last = steps[0], steps[-1]
     if closed:
-        return float(np.sqrt(np.mean((first - last) ** 2)))
-    return float(max(np.sqrt(np.mean(first**2)), np.sqrt(np.mean(last**2))))
+        return rms(first - last)
+    return max(rms(first), rms(last))
 
 
 def _gravity_deviation(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array, IntArray, Mask
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
+from models.arrays import Array, IntArray, Mask, rms
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, soles
 from models.mocap.motion import quaternions
+from models.mocap.motion.kinematics import segment_positions
 
 # Largest height difference among the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
 _MAX_SOLE_RANGE = 0.06
@@ -22,7 +23,7 @@ _MAX_SOLE_RANGE = 0.06
 _FLOOR_QUANTILE = 0.25
 # Largest speed of a standing sole [m/s]: with half the value one of the 28 captures of
 # docs/validation/prepared-captures.md gets a slope of 1.4°, with twice one keeps its slope.
-_MAX_STANDING_SPEED = 0.4
+MAX_STANDING_SPEED = 0.4
 _MIN_SPREAD = 0.25  # least RMS spread of standing soles in a direction whose slope is estimated [m]: a stride has 0.4
 # Least number of stances: half the value changes none of 17 captures, twice leaves the slope of one of them.
 _MIN_STANCE_COUNT = 4
@@ -63,7 +64,7 @@ def put_on_floor(root: Array, segments: Array, fps: float, counted: Mask | slice
     root, segments : arrays
         Positions and rotations after the shift and the rotation of the ankles.
     """
-    ankles = root[:, None, 2] + _ankle_positions(segments)[..., 2]
+    ankles = segment_positions(root, segments)[:, _FEET, 2]
     feet = segments[:, _FEET]
     points = soles().reshape(2, 4, 3)
     heights = ankles[:, :, None] + quaternions.rotated(feet[:, :, None], points)[..., 2] - CONTACT_RADIUS
@@ -77,17 +78,6 @@ def put_on_floor(root: Array, segments: Array, fps: float, counted: Mask | slice
     return root - np.array([0.0, 0.0, floor]), segments
 
 
-def _ankle_positions(segments: Array) -> Array:
-    """Positions of the ankles relative to the pelvis, in world axes [m], shape (frames, 2, 3)."""
-    model = figure_model()
-    places = np.zeros((len(segments), len(_FEET), 3))
-    for column, body in enumerate(_FEET):
-        while (parent := SEGMENTS[body].parent) >= 0:
-            places[:, column] += quaternions.rotated(segments[:, parent], model.body(BODIES[body]).pos)
-            body = parent
-    return places
-
-
 def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, float]:
     """The motion rotated so that its floor is level, and the angle [rad]; 0 where no slope can be estimated.
 
@@ -96,16 +86,15 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
     root, segments, fps
         As in `put_on_floor`.
     """
-    points = (root[:, None] + _ankle_positions(segments))[:, :, None] + quaternions.rotated(
-        segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3)
-    )
+    feet = quaternions.rotated(segments[:, _FEET][:, :, None], soles().reshape(2, 4, 3))
+    points = segment_positions(root, segments)[:, _FEET, None] + feet
     middle = points.mean(axis=2)
     lower = np.arange(len(points)), np.argmin(middle[..., 2], axis=1)
     if len(points) < 4:
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
     # Not `contacts.standing_parts`: the floor, above which a sole could be low, is not known yet.
-    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < _MAX_STANDING_SPEED)
+    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < MAX_STANDING_SPEED)
     begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also if the other foot takes over
     stances = int(begins.sum())
     slopes = (
@@ -133,7 +122,7 @@ def _floor_slopes(points: Array, feet: IntArray, stances: int) -> Array:
     spread = sizes / np.sqrt(len(points))
     is_spread = np.where(spread > _MIN_SPREAD, 1.0, 0.0)
     slopes = is_spread * (directions @ flat.T @ height) / np.maximum(sizes, 1e-9) ** 2
-    deviation = float(np.sqrt(np.mean((height - flat @ directions.T @ slopes) ** 2)))
+    deviation = rms(height - flat @ directions.T @ slopes)
     # A plane fits a few stances well whatever its slope: Student's t with the remaining degrees of freedom.
     degrees = stances - len(both) - int(is_spread.sum())
     min_rise = (

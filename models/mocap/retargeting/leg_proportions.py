@@ -16,18 +16,19 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from models.arrays import Array
-from models.humanoid.skeleton import BODIES, figure_model
-from models.mocap.motion import quaternions
+from models.humanoid.skeleton import BODIES
+from models.mocap.motion.kinematics import segment_positions
 from models.mocap.retargeting.body_lines import SIDES
+from models.mocap.retargeting.footing import MAX_STANDING_SPEED
 
-# Half or twice the first and the last of these moves the hips of ten captures by at most 2 mm; the second, 5 and 16 mm.
-_MAX_STANDING_SPEED = 0.4  # largest speed of a standing ankle, as that of soles in `footing` [m/s]
+# Half or twice this height moves the hips of ten captures by 5 and 16 mm; `MAX_STANDING_SPEED` and the next value by at
+# most 2 mm.
 _WEIGHT_DECAY_HEIGHT = 0.03  # height above the lower foot at which the other one has the weight 1/e [m]
 _SMOOTHING = 0.05  # standard deviation of the Gaussian filter for the correction of the hips [s]
 # Least improvement: by how much less level the figure's stances must be than the source's [m]. Of 144 captures it is at
 # most 0.010 in 131, and 0.038 and more in 13.
 _MIN_IMPROVEMENT = 0.02
-_LEG_SEGMENTS = (("thigh", "shank"), ("shank", "foot"))  # segments of a leg, each with the body at its end
+_THIGHS, _FEET = ([BODIES.index(f"{side}_{part}") for side in SIDES] for part in ("thigh", "foot"))
 
 
 def hips_over_feet(root: Array, segments: Array, legs: Array, ankles: Array, fps: float) -> Array:
@@ -51,11 +52,12 @@ def hips_over_feet(root: Array, segments: Array, legs: Array, ankles: Array, fps
     heights = places[..., 2]
     lower = np.arange(len(root)), heights.argmin(axis=1)
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=2)[lower] * fps
-    stands = np.flatnonzero(speed < _MAX_STANDING_SPEED)
+    stands = np.flatnonzero(speed < MAX_STANDING_SPEED)
     if len(stands) == 0:
         return root
     weights = np.exp((heights[lower][:, None] - heights) / _WEIGHT_DECAY_HEIGHT)
-    excess = (weights * (legs - _figure_legs(segments))[..., 2]).sum(axis=1) / weights.sum(axis=1)
+    joints = segment_positions(root, segments)
+    excess = (weights * (legs - (joints[:, _FEET] - joints[:, _THIGHS]))[..., 2]).sum(axis=1) / weights.sum(axis=1)
     level = heights[lower]
     if _height_range((level - excess)[stands]) < _height_range(level[stands]) + _MIN_IMPROVEMENT:
         return root
@@ -67,14 +69,3 @@ def hips_over_feet(root: Array, segments: Array, legs: Array, ankles: Array, fps
 def _height_range(heights: Array) -> float:
     """Range of heights [m] without a twentieth at either end."""
     return float(np.ptp(np.quantile(heights, (0.05, 0.95))))
-
-
-def _figure_legs(segments: Array) -> Array:
-    """The figure's ankles relative to its hips, in the world's axes [m], shape (frames, 2, 3)."""
-    model = figure_model()
-    legs = np.zeros((len(segments), len(SIDES), 3))
-    for column, side in enumerate(SIDES):
-        for part, end in _LEG_SEGMENTS:
-            thigh_or_shank = segments[:, BODIES.index(f"{side}_{part}")]
-            legs[:, column] += quaternions.rotated(thigh_or_shank, model.body(f"{side}_{end}").pos)
-    return legs

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, Mask
+from models.arrays import Array, Mask, rms
 from models.gravity import GRAVITY
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
@@ -292,7 +292,7 @@ def _fall_acceleration(heights: Array, fps: float) -> float:
     time = np.arange(len(heights)) / fps
     parabola = np.polyfit(time, heights, 2)
     change, fall = float(np.ptp(heights)), -2.0 * float(parabola[0])
-    error = float(np.sqrt(np.mean((heights - np.polyval(parabola, time)) ** 2)))
+    error = rms(heights - np.polyval(parabola, time))
     fits = change > _MIN_FALL_HEIGHT and error < _MAX_FALL_ERROR * change
     return fall if fits and 0.0 < fall < _MAX_FALL_RATIO * GRAVITY else 0.0
 

@@ -1,6 +1,5 @@
 """The map of a figure of another size: body points in proportion, the Jacobian, and the order of its kernels."""
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from controllers.haptic_map.sized import Sized, size_pose
 from experiments.setups.parts.expression import expressive_figure
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.mocap.library import embedded
+from models.mocap.motion.kinematics import contact_points
 from tests.controllers.clips_for_maps import assert_same_compiled, difference, displaced, stylus
 from tests.derivatives import central_differences
 
@@ -23,11 +23,7 @@ STYLUS = stylus(0.05, 1.0, 0.003)
 
 
 def soles(stature: float, pose: np.ndarray) -> np.ndarray:
-    figure = figure_model(stature)
-    data = mujoco.MjData(figure)
-    data.qpos[:] = pose
-    mujoco.mj_kinematics(figure, data)
-    return data.geom_xpos[[figure.geom(name).id for name in FOOT_CONTACTS]]
+    return contact_points(pose[None], FOOT_CONTACTS, figure_model(stature))[0]
 
 
 def test_sole_points_scale_with_the_figure() -> None:

@@ -2,20 +2,21 @@
 
 from functools import cache
 
-import mujoco
 import numpy as np
 import pytest
 
+from controllers.legs.sole_heights import SWING_HEIGHT
 from experiments.config.maps import Cylindrical
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
-from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
+from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.floor_forces import Floor, residual
 from models.mocap.motion.clip import pose_difference
 from sim.reference.reference import map_poses
+from tests.controllers.figure_soles import slide, soles
 
-TOUCH, PUSHES = 0.003, 0.008  # height [m] below which a foot that moves slides, and below which the floor can push
+FIGURE = figure_model()
 CONFIG = run_config(seconds=1.0)
 FIGURE_CLIPS = Cylindrical().clips
 STANDING = ("walk", "cheer", "angry", "squat_dance")
@@ -46,31 +47,6 @@ def laps(h_map, r, z, rows=ROWS, count=1.0):
     return map_poses(h_map, x)
 
 
-def soles(poses):
-    """Lowest points of the contact spheres, shape (n, 8, 3)."""
-    model = figure_model()
-    data, places = mujoco.MjData(model), []
-    spheres = [model.geom(name).id for name in FOOT_CONTACTS]
-    for pose in poses:
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        places.append(data.geom_xpos[spheres] - [0.0, 0.0, CONTACT_RADIUS])
-    return np.array(places)
-
-
-def slide(places):
-    """Largest distance over the floor of a sphere in contact from its touch-down [m]."""
-    worst, start = 0.0, [None] * places.shape[1]
-    for frame in places:
-        for k, place in enumerate(frame):
-            if place[2] >= TOUCH:
-                start[k] = None
-            else:
-                start[k] = place[:2] if start[k] is None else start[k]
-                worst = max(worst, float(np.linalg.norm(place[:2] - start[k])))
-    return worst
-
-
 @pytest.mark.parametrize("clips", SIMILAR)
 def test_similar_clips_are_blended_including_legs(clips):
     assert map_of(clips).upper == ()
@@ -79,7 +55,7 @@ def test_similar_clips_are_blended_including_legs(clips):
 @pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slow_params((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
 def test_in_between_feet_neither_slide_nor_sink(clips):
     for r, z in DENSE_MIXTURES:
-        places = soles(laps(map_of(clips), r, z, count=1.5))
+        places = soles(FIGURE, laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.02, (r, z)
         assert places[..., 2].min() > -0.007, (r, z)
 
@@ -89,7 +65,7 @@ def test_in_between_feet_neither_slide_nor_sink(clips):
 )
 def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
     h_map = wire(run_config(clips=clips, map="composite", seconds=1.0), load_clips(clips)[0]).haptic_map
-    places = [soles(laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
+    places = [soles(FIGURE, laps(h_map, r, 0.0, count=1.5)) for r in (-1.0, -0.3, 0.4, 1.0)]
     for feet in places:
         assert slide(feet) < 0.01
         np.testing.assert_allclose(feet, places[0], atol=1e-9)
@@ -104,7 +80,7 @@ def test_floor_can_provide_the_forces_of_in_betweens(clips, max_share, mean_shar
         change = pose_difference(poses[:-1], poses[1:]) / step
         v, a, q = (change[1:] + change[:-1]) / 2, np.diff(change, axis=0) / step, poses[1:-1]
         demand = floor.demand(q, v, a)
-        left = residual(demand, floor.grip(demand, soles(q)[..., 2] < PUSHES))[:, :3] / floor.body_weight
+        left = residual(demand, floor.grip(demand, soles(FIGURE, q)[..., 2] < SWING_HEIGHT))[:, :3] / floor.body_weight
         shares.append(float(np.sqrt((left**2).sum(axis=1).mean())))
     # Hicks et al. 2015: good below 5 %; where a walk has just begun to fade, a little more.
     assert max(shares) < max_share

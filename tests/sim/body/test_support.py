@@ -5,7 +5,7 @@ import numpy as np
 
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.library import embedded
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.figure import Figure, FigureGains
 from sim.body.tracking import TrackingConfig, floor_world

@@ -1,6 +1,5 @@
 """Settling: if the hand holds an animation in the middle of a flight, the figure stands instead of hovering."""
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -15,9 +14,9 @@ from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.hands import edited_until
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.clip import pose_difference, pose_errors
+from models.mocap.motion.kinematics import contact_points
 from models.world.scene import FIGURE
-from sim.loop.channels import pose_errors
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
@@ -34,13 +33,7 @@ def _poses(name: str) -> np.ndarray:
 
 def _lowest(poses: np.ndarray) -> np.ndarray:
     """Height of the lowest contact sphere of the feet over the floor [m], by MuJoCo."""
-    data, ids = mujoco.MjData(FIGURE_MODEL), [FIGURE_MODEL.geom(name).id for name in FOOT_CONTACTS]
-    heights = np.empty(len(poses))
-    for i, pose in enumerate(poses):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(FIGURE_MODEL, data)
-        heights[i] = data.geom_xpos[ids, 2].min() - CONTACT_RADIUS
-    return heights
+    return contact_points(poses, FOOT_CONTACTS, FIGURE_MODEL)[:, :, 2].min(axis=1) - CONTACT_RADIUS
 
 
 @pytest.mark.parametrize("name", ["jump", "run"])

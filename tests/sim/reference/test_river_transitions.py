@@ -27,6 +27,7 @@ from experiments.studies.change_trials import (
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.kinematics import sole_points
 from sim.reference.reference import make_reference, reference_along
 from sim.reference.transition import DWELL_TIME
 from tests.sim.gliding_hand import gliding_hand
@@ -93,14 +94,8 @@ def test_figure_continues_from_its_place_on_the_floor(clips_of_rivers) -> None:
 
 
 def test_feet_in_contact_step_instead_of_sliding(clips_of_rivers) -> None:
-    poses, data = _played(clips_of_rivers, BLEND), mujoco.MjData(FIGURE)
-    ids = [FIGURE.geom(name).id for name in FOOT_CONTACTS]
-    points = np.empty((len(poses), len(ids), 3))
-    for pose, row in zip(poses, points, strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(FIGURE, data)
-        row[:] = data.geom_xpos[ids]
-    height = points[..., 2] - FIGURE.geom_size[ids, 0]
+    points = sole_points(_played(clips_of_rivers, BLEND))
+    height = points[..., 2] - CONTACT_RADIUS
     step = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)
     for moment, _ in CHANGES:
         first, last = round((moment + DWELL_TIME) / PERIOD), round((moment + DWELL_TIME + BLEND) / PERIOD)

@@ -10,6 +10,7 @@ from scipy.optimize import nnls
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, JOINTS, figure_model, joint_range
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.motion.foot_skate import ContactSlide
 
 G = 9.81
 TOUCH = 0.003  # largest height of a contact sphere that may push [m]
@@ -57,18 +58,10 @@ def acceleration(m: Measures) -> np.ndarray:
 
 
 def largest_slide(m: Measures) -> float:
-    """Largest horizontal distance of a touching sphere from where it landed [m]."""
-    worst = 0.0
-    for sphere in range(8):
-        landing = None
-        for k, touches in enumerate(m.touching[:, sphere]):
-            if not touches:
-                landing = None
-            elif landing is None:
-                landing = m.soles[k, sphere, :2]
-            else:
-                worst = max(worst, float(np.linalg.norm(m.soles[k, sphere, :2] - landing)))
-    return worst
+    """Largest slide of a touching sphere [m]."""
+    slide = ContactSlide()
+    slide.add(m.soles, m.touching)
+    return slide.largest
 
 
 def residuals(m: Measures) -> tuple[np.ndarray, np.ndarray]:
@@ -89,10 +82,6 @@ def residuals(m: Measures) -> tuple[np.ndarray, np.ndarray]:
         remainders[k] = np.linalg.norm(remainder[:3]), np.linalg.norm(remainder[3:]) / 2
     remainders /= m.mass * G
     return remainders[:, 0], remainders[:, 1]
-
-
-def rms(x: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(x))))
 
 
 def limit_excess(clip: Clip) -> float:

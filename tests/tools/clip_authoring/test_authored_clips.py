@@ -1,8 +1,9 @@
 """Committed gaits and flights: joint ranges, limb clearance, feet and required floor forces."""
 
 import pytest
-from clip_measures import largest_slide, limb_penetration, limit_excess, measured, residuals, rms
+from clip_measures import largest_slide, limb_penetration, limit_excess, measured, residuals
 
+from models.arrays import rms
 from models.mocap.library import embedded
 
 NAMES = ["walk", "run", "jump", "backflip"]

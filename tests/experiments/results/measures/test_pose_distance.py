@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.results.measures.pose_distance import geodesic_distance, seen_distance, segment_places
-from models.humanoid.skeleton import BODIES, N_TANGENT, figure_model, rest_pose
+from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
+from models.humanoid.skeleton import N_TANGENT, figure_model, rest_pose
 
 
 @pytest.fixture(scope="module")
@@ -18,14 +18,6 @@ def poses(figure: mujoco.MjModel, n: int, seed: int) -> np.ndarray:
     for pose in result:
         mujoco.mj_integratePos(figure, pose, rng.normal(scale=0.3, size=N_TANGENT), 1.0)
     return result
-
-
-def test_segment_places_match_mujoco_kinematics(figure: mujoco.MjModel) -> None:
-    samples, data = poses(figure, 5, 1), mujoco.MjData(figure)
-    for pose, places in zip(samples, segment_places(samples, figure), strict=True):
-        data.qpos = pose
-        mujoco.mj_kinematics(figure, data)
-        np.testing.assert_allclose(places, [data.body(body).xpos for body in BODIES], atol=1e-12)
 
 
 def test_geodesic_distance_is_the_norm_of_the_tangent(figure: mujoco.MjModel) -> None:

@@ -7,7 +7,8 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.contacts import contacts, standing_parts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import smoothed, sole_points
+from models.mocap.motion.kinematics import sole_points
+from models.mocap.preparation.poses import smoothed
 from models.mocap.preparation.stances import stances
 
 FPS = 100.0

@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, JOINTS, N_TANGENT
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import contact_points
+from models.mocap.motion.kinematics import contact_points
 from tools.clip_authoring.coordinates import poses
 
 PALMS = slice(len(FOOT_CONTACTS), len(ALL_CONTACTS))

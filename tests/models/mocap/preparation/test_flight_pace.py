@@ -6,8 +6,8 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, HAND_CONTACTS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.preparation.pace import correct_pace, flight_acceleration
-from models.mocap.preparation.poses import contact_points
 
 
 @pytest.mark.parametrize("name", ["jump", "backflip"])

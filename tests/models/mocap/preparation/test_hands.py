@@ -16,11 +16,11 @@ from models.humanoid.skeleton import (
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, residual
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import contact_points
 from models.mocap.preparation import feasible
 from models.mocap.preparation.change import DEGREE, Change
 from models.mocap.preparation.feasible import _Problem, contact_forces
 from models.mocap.preparation.hand_stances import extend_hand_stances
-from models.mocap.preparation.poses import contact_points
 from models.mocap.preparation.stances import stances
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.preparation.push_up import PALMS, held, propped

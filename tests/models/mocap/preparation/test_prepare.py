@@ -12,13 +12,14 @@ from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
+from models.mocap.motion.foot_skate import stance_skates
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.feasible import contact_forces, feasible
 from models.mocap.preparation.fidelity import MAX_JOINT_DISTANCE
 from models.mocap.preparation.looping import close_or_rest, mirrored
-from models.mocap.preparation.poses import add_tangents, resampled, sole_points
+from models.mocap.preparation.poses import add_tangents, resampled
 from models.mocap.preparation.prepare import prepared
-from models.mocap.preparation.skate import stance_slides
 from models.mocap.preparation.stances import stances, with_feet_at_rest
 from models.mocap.preparation.well_formed import outliers, well_formed
 from models.mocap.readers.own_bvh import write_bvh
@@ -293,17 +294,6 @@ def test_place_weight_is_zero_in_flight(hop):
     assert (schedule.kept[flies] == 0.0).all()
 
 
-def test_stance_slide_is_the_largest_distance_from_the_median_place():
-    points = np.zeros((10, 2, 3))
-    points[:4, 0, 0] = 0.0, 0.0, 0.0, 0.03
-    points[6:, 0, 1] = 0.1, 0.1, 0.1, 0.14
-    points[:, 1, 2] = 0.01 * np.arange(10)
-    standing = np.ones((10, 2), dtype=bool)
-    standing[4:6, 0] = False
-    np.testing.assert_allclose(stance_slides(points, standing), [0.03, 0.04, 0.0])
-    np.testing.assert_allclose(stance_slides(points, ~np.ones((10, 2), dtype=bool)), [0.0])
-
-
 def test_mean_load_of_a_walk_is_the_body_weight(walks):
     walk = walks[0]
     loads = contact_forces(walk, stances(walk, walk)).loads.sum(axis=1)
@@ -315,8 +305,8 @@ def test_low_moving_sole_part_without_load_does_not_count_as_foot_skate(walks):
     walk = walks[0]
     schedule = stances(walk, walk)
     points = sole_points(walk.poses)
-    all_slides = stance_slides(points, schedule.standing)
-    assert well_formed(walk, ()).slid < all_slides.max()
+    all_skates = stance_skates(points, schedule.standing)
+    assert well_formed(walk, ()).slid < all_skates.max()
 
 
 def test_sole_below_the_floor_is_a_fault_though_it_does_not_stand(walks):

@@ -4,7 +4,8 @@ import pytest
 from models.arrays import Array
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import resampled, smoothed, sole_points
+from models.mocap.motion.kinematics import sole_points
+from models.mocap.preparation.poses import resampled, smoothed
 from models.mocap.preparation.root_path import without_foot_sliding
 
 FPS = 120.0

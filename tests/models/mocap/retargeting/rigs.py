@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.library import embedded
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import global_rotations
 from tests.models.mocap.retargeting.rig_families import FAMILIES, NECKS, SPINES
 
 ZERO_POSES = ("T", "A", "upright T", "upright A", "random", "along X", "legs up", "along bones Y")

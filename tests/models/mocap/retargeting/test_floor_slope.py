@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from models.mocap.library import embedded
 from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import global_rotations
 from models.mocap.retargeting import footing
 from models.mocap.retargeting.footing import levelled
 

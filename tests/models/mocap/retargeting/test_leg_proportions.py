@@ -7,7 +7,7 @@ from models.gravity import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model, rest_pose
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import sole_points
+from models.mocap.motion.kinematics import sole_points
 from models.mocap.retargeting import retarget
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leg_proportions import hips_over_feet

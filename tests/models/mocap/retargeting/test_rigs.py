@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
 from models.mocap.library import embedded, embedded_names, load
-from models.mocap.motion import quaternions
-from models.mocap.motion.clip import Clip, global_rotations
-from models.mocap.preparation.poses import sole_points
-from models.mocap.retargeting import abdomen, calibration, footing, retarget
+from models.mocap.motion import kinematics, quaternions
+from models.mocap.motion.clip import Clip
+from models.mocap.motion.kinematics import global_rotations, sole_points
+from models.mocap.retargeting import abdomen, calibration, retarget
 from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
 
@@ -95,7 +95,7 @@ def cached_figure_model():
     """Compile the model of the figure once instead of a dozen times per file."""
     with pytest.MonkeyPatch.context() as patched:
         model = cache(figure_model)
-        for module in (abdomen, calibration, footing, retarget):
+        for module in (abdomen, calibration, kinematics, retarget):
             patched.setattr(module, "figure_model", model)
         yield
 
