@@ -18,7 +18,7 @@ sys.stdin = sys.stdin or open(os.devnull)  # noqa: SIM115
 
 def stop_early(*_: object) -> None:
     """Handle an interrupt while the program is still importing, where an exception would end in a traceback."""
-    os.write(2, b"hvf: stopped; nothing is left half done\n")
+    os.write(2, b"hvf: stopped; no partial files are left\n")
     os._exit(130)
 
 
@@ -37,10 +37,10 @@ _BACKEND_LIBRARIES = {"egl": ("EGL", "libegl1 libgl1-mesa-dri"), "osmesa": ("OSM
 _requested_backend = os.environ.get("MUJOCO_GL", "").lower().strip()
 _library, _package = _BACKEND_LIBRARIES.get(_requested_backend, ("", ""))
 if _requested_backend not in _BACKENDS:
-    print(f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, which MuJoCo does not know: left out", file=sys.stderr)
+    print(f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, which MuJoCo does not know: ignored", file=sys.stderr)
 elif _library and find_library(_library) is None:
     print(
-        f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, and lib{_library} is not on this machine: left out; "
+        f"MUJOCO_GL is {os.environ.pop('MUJOCO_GL')!r}, and lib{_library} is not on this machine: ignored; "
         f"unset it, or apt-get install {_package}",
         file=sys.stderr,
     )

@@ -138,4 +138,4 @@ def select_legs(
                     best, name, best_verdict = made, names[i], verdict
             if best_verdict.bearable:
                 return best, ()
-    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best that is found at this lap",)
+    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)

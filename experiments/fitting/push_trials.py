@@ -86,4 +86,4 @@ def followed_map(
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with what it bears best",)
+    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with the best part of it",)

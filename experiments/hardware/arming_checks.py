@@ -47,7 +47,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     found_delay = linkage_of(config.device).delay
     if delay < found_delay:
         raise SimError(
-            f"the device file tells of a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
+            f"the device file has a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
             "here and in hvf certify"
         )
     clips: tuple[Clip, ...] = ()
@@ -62,7 +62,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
         raise ChangedInputs(f"{file} certifies another field or device: {changes}; certify this one") from None
     stable = {name: verdict for name, verdict in found.verdicts.items() if name.startswith("stability")}
     if not stable:
-        raise SimError(f"{file}: says nothing of stability; expected the certificate of a field")
+        raise SimError(f"{file}: has no verdict on stability; expected the certificate of a field")
     for name, verdict in stable.items():
         if verdict.verdict != "certified":
             raise SimError(f"{file}: {name} is {verdict.verdict}, so no device is armed with it; {verdict.reason}")
@@ -128,10 +128,10 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
         If it has no motors, is not calibrated, or the calibration is of another device.
     """
     if not identity.forces:
-        raise SimError(f"{identity.name} has no motors: no force can be felt on it; it plays, it is not armed")
+        raise SimError(f"{identity.name} has no motors and gives no force: it can be played, not armed")
     if calibration is None and not identity.calibrated:
         raise SimError(
-            f"{identity.name} is not calibrated: its encoders do not know their zero; expected a --device-file that "
+            f"{identity.name} is not calibrated: its encoders have no zero; expected a --device-file that "
             "hvf hardware calibrate has written"
         )
     if calibration is not None and (reason := calibration.rejection_reason(identity)):
@@ -142,7 +142,7 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
     warnings: list[str] = []
     if not identity.watchdog:
         warnings.append(
-            f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; "
+            f"{identity.name} has no watchdog: if this machine stops, its motors keep their last torque; "
             "keep its power switch within reach"
         )
     if identity.own_weight and not identified:

@@ -215,7 +215,7 @@ class ServoProcess:
         """Compile and warm up with the motors off, then request real-time scheduling and report `Ready`."""
         for _ in range(3):
             self._ticker.tick(0)
-        report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
+        report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as requested."]
         self._ticker.tick(0)
         self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
         self._ticker.parts.driver.telemetry[[LOST, REFUSED]] = 0.0  # losses before the start do not count

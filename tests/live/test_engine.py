@@ -243,7 +243,7 @@ def test_too_short_take_is_refused(tmp_path):
 def test_take_during_pause_leaves_no_folder(tmp_path):
     engine = make_engine()
     take = Take(tmp_path / "take", engine)
-    with pytest.raises(SimError, match="time stood still"):
+    with pytest.raises(SimError, match="time was paused"):
         take.end(engine)
     assert not (tmp_path / "take").exists()
 

@@ -57,7 +57,7 @@ NO_HAND = HandImpedance()
 
 @dataclass(frozen=True)
 class HandRange:
-    """Intervals of the impedance of the hands that may hold the stylus.
+    """Impedance intervals of the hands that may hold the stylus.
 
     Parameters
     ----------

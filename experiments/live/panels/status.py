@@ -2,6 +2,7 @@
 
 import html
 
+from controllers.safety.faults import Fault
 from controllers.state import Array
 from experiments.live.session.desk import Desk
 
@@ -21,10 +22,10 @@ FIRST_STEPS = """
 def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Desk) -> str:
     """HTML of the status lines, including a fault of the device."""
     median, high = 1e3 * now["cost"]
-    pace = "paused; space or “Pause” goes on" if desk.paused else f"{now['pace'][0]:.2f} × real time"
+    pace = "paused; space or “Pause” resumes" if desk.paused else f"{now['pace'][0]:.2f} × real time"
     lines = [f"<b>{now['t'][0]:.2f} s</b> · {pace}"]
     if desk.paused and desk.holds:
-        lines.append("<b>Press space</b>: you hold the stylus, but time stands still")
+        lines.append("<b>Press space</b>: you hold the stylus, but time is paused")
     if going:
         lines.append(html.escape(going))
     elif driver is None:
@@ -34,6 +35,6 @@ def status_html(now: dict[str, Array], driver: int | None, going: str, desk: Des
     if desk.records:
         lines.append(f'<b style="color:#c02020">● recording, {now["recording"][0]:.1f} s</b>')
     if now["fault"][0] != 0.0:
-        lines.append(f"the device has let go (fault {int(now['fault'][0])}): press “Re-arm”")
+        lines.append(f"the motors are off: {Fault(int(now['fault'][0])).words(now['fault'][1])}; press “Re-arm”")
     lines.append(f'<span style="color:#7a8494">a tick takes {median:.2f} ms, 99 % under {high:.2f} ms</span>')
     return "".join(f'<p style="margin:.25rem .75rem;font-size:.8rem">{line}</p>' for line in lines)

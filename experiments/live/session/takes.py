@@ -93,7 +93,7 @@ class Take:
             with suppress(OSError):  # it may hold a user's files
                 self.folder.rmdir()
             raise SimError(
-                f"{self.folder}: time stood still, and nothing was recorded; expected {MIN_TAKE_DURATION:g} s or more"
+                f"{self.folder}: time was paused, and nothing was recorded; expected {MIN_TAKE_DURATION:g} s or more"
             )
         self._recorder.flush()
         if seconds < MIN_TAKE_DURATION:

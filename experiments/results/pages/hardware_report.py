@@ -79,7 +79,7 @@ def twin_figure(recording: Recording) -> Figure:
     apart.set(title="from the prediction of a tick to its measurement", ylabel="[µm]")
     sizes = np.linalg.norm(thinned_rows(recording, "hand_force"), axis=1)
     force.plot(thinned_rows(recording, "t"), sizes, color=USER)
-    force.set(title="force of the hand, as the twin tells it", xlabel="t [s]", ylabel="[N]")
+    force.set(title="force of the hand, estimated by the twin", xlabel="t [s]", ylabel="[N]")
     return figure
 
 

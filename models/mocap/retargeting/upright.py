@@ -123,7 +123,7 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
         min_score = np.inf  # without ankles, the lowest joints are knees, which do not support a squat
     if lead < _MIN_LEAD or scores[best] < min_score:
         raise MotionFileError(
-            motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
+            motion.path, 0, f"the up axis cannot be inferred ({best} or {second})", f"--up {best} or --up {second}"
         )
     return Up(np.array(AXES[best], dtype=np.float64), lead)
 

@@ -92,7 +92,7 @@ def test_outcome_of_killed_servo_marks_unknown_values(tmp_path: Path, ticks: int
     last = RunStatus(False, State.ACTIVE, Fault.NONE, 0.0, row, None)
     outcome = outcome_of(tmp_path / "run.h5", ready, None, last)
     text = "\n".join(outcome.lines())
-    assert "the servo was gone before it told how long they took" in text
-    assert "By how much the servo grew is not known" in text
+    assert "their durations and lateness are unknown" in text
+    assert "The servo's growth is unknown" in text
     values = outcome.to_json()
     assert [values[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4

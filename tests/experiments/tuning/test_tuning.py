@@ -176,7 +176,7 @@ def test_pareto_front_and_its_middle_choice() -> None:
         ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "low > 0 for log|log of > 0"),
         ({"objectives": ["speed"]}, "no objective 'speed'"),
         ({"objectives": ["margin"]}, "no measure among its objectives"),
-        ({"objectives": ["effort", "effort"]}, "an objective stands twice"),
+        ({"objectives": ["effort", "effort"]}, "an objective appears twice"),
         ({"tasks": ["trace", "fly"]}, "no user 'fly'"),
         ({"held_back": {"number": 3, "seed": 2, "does": "fly"}}, "no user 'fly'"),
         ({"objectives": ["expressiveness"]}, "kinematic"),

@@ -285,7 +285,7 @@ def test_joints_moved_by_positions_alone_are_refused(mocap, tmp_path):
         load(tmp_path / "positions.bvh")
 
 
-NON_HUMAN_LEGS = "which are no human's: the file's unit is another"
+NON_HUMAN_LEGS = "which is not human: the file's unit is another"
 
 
 @pytest.mark.parametrize(("length", "human"), [("0.45", True), ("0.01", False), ("45", False), ("1", True)])
