@@ -78,7 +78,7 @@ _DESCRIPTIONS = {
     Fault.DEVICE_RESET: "the device restarted by itself",
     Fault.VERSION_WRONG: "the device speaks major version {:.0f} of the protocol",
     Fault.REPORT_MALFORMED: "a report of {:.0f} bytes",
-    Fault.DEVICE_REPORTED: "the device reported an error of its own, {:.0f}",
+    Fault.DEVICE_REPORTED: "the device reported error {:.0f}",
     Fault.OSCILLATION: "the force oscillated by {:.3g} N at the frequency of an instability",
     Fault.LEFT_WORKSPACE: "the stylus was {:.3g} m outside the workspace",
     Fault.TOO_FAST: "the stylus moved at {:.3g} m/s",

@@ -8,7 +8,7 @@ from controllers.errors import ParameterError
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
 from experiments.config.options import given_options
-from experiments.config.run_config import RunConfig, meaningless_options
+from experiments.config.run_config import FIGURE_DEFAULTS, RunConfig, meaningless_options
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
 from experiments.hardware.run_options import EMULATED, RunHardware, check_emulate
@@ -93,6 +93,17 @@ def check_meaning(options: RunHardware) -> None:
         )
 
 
+def ignored_options(config: RunConfig) -> list[str]:
+    """Options of a configuration that have no effect on a device: those of its simulated hand and of its figure."""
+    user, figure = config.user, config.figure
+    idle = ["user"] if user.does not in ("relaxed", "lead") else []
+    idle += [name for name in ("person", "pushes", "turns", "grabs") if getattr(user, name)]
+    idle += ["figure"] if figure.kind != "physical" else []
+    numbers = meaningless_options("kinematic", config.leads)
+    idle += [name for name in numbers if getattr(figure, name) != FIGURE_DEFAULTS[name]]
+    return [f"--{name.replace('_', '-')}" for name in idle]
+
+
 def check_limits(options: RunHardware) -> None:
     """Refuse limits that would not protect a hand on a real device.
 
@@ -147,7 +158,7 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
         )
     if identity.own_weight and not identified:
         warnings.append(
-            f"{identity.name} is no Phantom by build, and the certificate is for the friction and inertia of one; find "
-            "out its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
+            f"{identity.name} is not a Phantom, and the certificate assumes a Phantom's friction and inertia; identify "
+            "its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
         )
     return warnings

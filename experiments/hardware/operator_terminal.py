@@ -109,7 +109,7 @@ def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
         + " the requested force has to be small first.",
         State.RAMPING: "The force comes in.",
         State.ACTIVE: "Active." + (" Enter switches the motors off." if terminal else ""),
-        State.FAULT: f"Motors switched off at {float(status.row['t']):.3f} s: {status.fault.words(status.value)}."
+        State.FAULT: f"Motors switched off at {float(status.row['t']):.3f} s: {status.fault_text}."
         + (" Enter clears it, and arms again." if terminal else ""),
     }
     return f"{float(status.row['t']):8.2f} s  {texts[status.state]}"

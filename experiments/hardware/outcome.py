@@ -121,7 +121,7 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
     return Outcome(
         device=ready.identity.name,
         transport=ready.identity.transport,
-        fault="" if last.fault is Fault.NONE else last.fault.words(last.value),
+        fault="" if last.fault is Fault.NONE else last.fault_text,
         silent=ended is None,
         broken=ended.broken if ended else "",
         ticks=ended.ticks if ended else int(last.row["tick"]),

@@ -43,8 +43,8 @@ class RunHardware:
     """No force before the requested one has been at most this small [N]."""
     ramp: Annotated[float, above(0.0, unit="s")] = 1.0
     """Time over which the force is ramped up [s]."""
-    late: Annotated[float, above(0.0, unit="s")] = 0.04
-    """Lateness of the servo that counts as a fault [s]."""
+    late: Annotated[float, above(0.0, unit="s", most=10.0)] = 0.04
+    """Lateness of the servo that counts as a fault, at most 10 [s]."""
     silence: Annotated[float, at_least(2.0, unit="periods", most=5000.0)] = 5.0
     """Time without a new reading that counts as a fault; above 5, only with the emulated device [servo periods]."""
     realtime: bool = True

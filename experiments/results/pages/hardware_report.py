@@ -34,13 +34,14 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     lines : sequence of str
         What happened, one sentence per line.
     """
-    (folder / FIGURES).mkdir(exist_ok=True)
     images: list[str] = []
     figures = {"forces": forces_figure, "twin": twin_figure, "servo": servo_figure, "link": link_figure}
     for name, draw in figures.items():
         file = folder / FIGURES / f"{name}.png"
         with mpl.rc_context(STYLE):
-            draw(recording).savefig(file, dpi=150)
+            drawing = draw(recording)
+            file.parent.mkdir(exist_ok=True)  # only now: a recording without rows leaves no folder
+            drawing.savefig(file, dpi=150)
         images.append(image(file, name))
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     body = f"<ul>{items}</ul>{''.join(images)}"
