@@ -209,9 +209,10 @@ def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_p
     assert not list(tmp_path.iterdir())
 
 
-def test_missing_library_for_mujoco_gl_is_named_and_skipped() -> None:
+@pytest.mark.parametrize("first", ["from experiments.cli import main; main(['clips'])", "import hvf"])
+def test_missing_library_for_mujoco_gl_is_named_and_skipped(first: str) -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
-    code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
+    code += f"{first}; import os; print(os.environ.get('MUJOCO_GL'))"
     completed = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"MUJOCO_GL": "osmesa"}, capture_output=True, text=True,
         check=True, timeout=60,
