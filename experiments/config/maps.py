@@ -14,7 +14,7 @@ class Circle:
     Parameters
     ----------
     lap : float
-        Time of a lap [s]; in less than a tenth of a second no hand goes round.
+        Time of a lap [s]; in less than a tenth of a second no hand completes one.
     radius : float
         Radius of the circle [m].
     wave : float

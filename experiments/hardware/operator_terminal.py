@@ -107,7 +107,7 @@ def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
         State.ARMING: "Arming: no force yet"
         + (", the switch has to be held, and" if dead_man else ";")
         + " the requested force has to be small first.",
-        State.RAMPING: "The force comes in.",
+        State.RAMPING: "The force ramps up.",
         State.ACTIVE: "Active." + (" Enter switches the motors off." if terminal else ""),
         State.FAULT: f"Motors switched off at {float(status.row['t']):.3f} s: {status.fault_text}."
         + (" Enter clears it, and arms again." if terminal else ""),

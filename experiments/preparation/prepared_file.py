@@ -115,7 +115,7 @@ def changes(made: Prepared) -> tuple[str, ...]:
         what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
     if pace.pace != 1.0:
-        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall at {pace.falls:.1f} m/s²")
     if made.root_shift > _MIN_ROOT_SHIFT:
         lines.append(f"moved over the floor by up to {100 * made.root_shift:.0f} cm, since a loaded foot slides")
     if not made.near:

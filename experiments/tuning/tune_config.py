@@ -181,7 +181,7 @@ def _check_space(config: TuneConfig, where: str) -> None:
     for word, span in config.space.items():
         if not span.low < span.high or (span.log and span.low <= 0.0):
             raise StudyError(
-                f"{where}: {word} lies between {span.low:g} and {span.high:g}; expected low < high, log of > 0"
+                f"{where}: {word} is from {span.low:g} to {span.high:g}; expected low < high, and above 0 with log"
             )
         if word in ("seed", "seconds"):
             raise StudyError(f"{where}: {word!r} is not a number to tune; expected one of field, map or figure")

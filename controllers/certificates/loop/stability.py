@@ -213,7 +213,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     margin = min(least, MAX_STIFFNESS) / own - 1.0
     figures = _figures(river, found)
     assumptions = (
-        "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
+        "linear: small deviations, no Coulomb friction, no rounding; a force cut by the limiter is treated as one of "
         f"lower gains, down to {LIMITER_FACTORS[0]:.0%} of them, and its slew is not reached",
         f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",

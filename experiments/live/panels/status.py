@@ -9,7 +9,7 @@ from experiments.live.session.desk import Desk
 FIRST_STEPS = """
 - **Drag the orange ball**: it is your hand on the stylus. The stylus lags behind it as a hand feels the field: the
   green arrow is the force on you, the orange one yours. Let go, and the stylus finds its way back to the curve.
-- The **figure** moves as the stylus does; the translucent one shows the animation that nobody touches.
+- The **figure** moves as the stylus does; the translucent one shows the undisturbed animation.
 - To **change the animation for good**, choose the mode *stretch-then-follow* and *Run this*, tick *Grab and bend*, drag
   the curve, and *Perform the bent curve*.
 - **Keys**: I J K L and U O move the hand (H lets go), space pauses and goes on, N steps, Z and Y undo and redo,

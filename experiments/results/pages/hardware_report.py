@@ -53,7 +53,7 @@ def forces_figure(recording: Recording) -> Figure:
     """Force commanded by the field, force after the gate, and distance from the curve; states of the gate shaded."""
     t, asked, force = (thinned_rows(recording, name) for name in ("t", "asked", "force"))
     figure, (above, below) = _panels(2)
-    above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="asked for by the field")
+    above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="requested by the field")
     above.plot(t, np.linalg.norm(force, axis=1), color=FIELD, label="let through to the motors")
     above.set(title="force on the hand", ylabel="[N]")
     below.plot(t, 1e3 * thinned_rows(recording, "distance"), color=AXES[0])
@@ -94,7 +94,7 @@ def servo_figure(recording: Recording) -> Figure:
         axes.loglog(1e6 * values[-ranks], share[-ranks], color=color, label=label)
     period = 1e6 / recording.rates["ticks"]
     axes.axvline(period, color="#222a38", lw=0.8, ls=(0, (4, 3)), label="a period")
-    axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="share of ticks")
+    axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="fraction of ticks")
     axes.legend(loc="lower left")
     return figure
 

@@ -77,7 +77,7 @@ MEASURES: dict[str, Measure] = {
         Measure("expressiveness", "rad", "more", _EXPRESSIVE, "kinematic"),
         Measure("expressiveness_seen", "cm", "more", _SEEN, "kinematic"),
         Measure("ballistic_error", "", "less", "RMS residual force in flight over body weight", "physical"),
-        Measure("contact_error", "", "less", "share of stance without the ground's support", "physical"),
+        Measure("contact_error", "", "less", "fraction of stance without ground support", "physical"),
         Measure("fell", "", "less", "whether the figure fell", "physical"),
         Measure("faults", "", "less", "faults of the device that were latched"),
         Measure("margin_used", "", "less", "k_r over the critical k_r of the stability certificate, 1 at the boundary"),

@@ -168,10 +168,10 @@ def frame_remarks(
     """A frame time that is not stated or long, lost frames, a last frame left out, and jumps that remain."""
     if not timed:
         remark = f"the file states no frame rate: {fps:g} a second are assumed"
-        yield f"{remark}; if it is another, state it with --frame-rate"
+        yield f"{remark}; if it is another, give it with --frame-rate"
     if fps < MIN_FRAME_RATE:
         remark = f"a frame lasts {two_digits(1.0 / fps)} s, longer than a camera's"
-        yield f"{remark}: if that is not so, state its --frame-rate"
+        yield f"{remark}: if that is wrong, give --frame-rate"
     if broken:
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
@@ -204,7 +204,7 @@ def leg_speed_remarks(legs: Array, fps: float) -> Iterator[str]:
     swift = float(np.quantile(speeds, _SPEED_QUANTILE)) if len(speeds) else 0.0
     if swift > _MAX_ANKLE_SPEED:
         remark = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
-        yield f"{remark}: if {fps:g} frames a second are not so, state the --frame-rate"
+        yield f"{remark}: if {fps:g} frames a second are wrong, give --frame-rate"
 
 
 def in_place_remarks(path: Array, ankles: Array, fps: float) -> Iterator[str]:
@@ -248,7 +248,9 @@ def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iter
 def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
     """Skeletons whose hips are at the same place, only one of which is used."""
     if hips:
-        remark = f"{len(hips)} skeletons have their hips at one place ({', '.join(hips)}): that of {taken} is taken"
+        remark = (
+            f"{len(hips)} skeletons have their hips at the same position ({', '.join(hips)}): that of {taken} is used"
+        )
         yield f'{remark}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
 
 
@@ -315,7 +317,7 @@ def axis_name(direction: Array) -> str:
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
     """The unit in which the performer's legs are about as long as the figure's."""
     if unit is not None:
-        description = f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+        description = f"{unit:.5g} m (fixed by the format), legs {leg * unit:.2f} m"
         human = _MIN_LEG_LENGTH <= leg * unit <= _MAX_LEG_LENGTH
         return description if human else f"{description}, which is not human: the file's unit is another"
     name, unit = min(_UNITS, key=lambda known: abs(np.log(leg * known[1] / own_leg)))

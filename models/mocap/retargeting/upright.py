@@ -305,7 +305,7 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
     clear = [np.sign(s) for s in signs if abs(s) > _MIN_EVIDENCE]
-    stated = "left and right as the names say, or --roles FILE that says them"
+    stated = "left and right as named, or --roles FILE"
     shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
     if lines.has_arms and np.sum(lines.left * shoulders) < 0.0:
         which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"

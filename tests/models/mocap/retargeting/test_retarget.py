@@ -268,7 +268,7 @@ def test_rest_pose_with_hanging_arms_keeps_them_hanging(mocap, model):
 
 def test_skeleton_without_legs_is_refused(mocap):
     with pytest.raises(
-        MotionFileError, match=r"sinusoidal.bvh:1: no joint is taken for the left_thigh \(among base, ch"
+        MotionFileError, match=r"sinusoidal.bvh:1: no joint was found for the left_thigh \(among base, ch"
     ):
         load(mocap / "quirks/fairmotion_sinusoidal.bvh")
 
@@ -294,5 +294,5 @@ def test_unit_of_the_format_is_doubted_if_it_gives_legs_of_no_human(tmp_path, le
     (tmp_path / "1_1.amc").write_text(AMC)
     report = load(tmp_path / "1_1.amc").report
     assert report is not None
-    assert "(the format says so), legs" in report.unit
+    assert "(fixed by the format), legs" in report.unit
     assert (NON_HUMAN_LEGS in report.unit) != human
