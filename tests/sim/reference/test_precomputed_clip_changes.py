@@ -154,7 +154,8 @@ def test_common_stride_count_of_two_clips_is_found(map_with_offsets: RiverClips)
         (
             Verdict(0.2, 6.5),
             (
-                "from river to river the physical figure falls at 6.5 s, 1.0 s after the change from squat_dance to walk",
+                "from river to river the physical figure falls at 6.5 s, "
+                "1.0 s after the change from squat_dance to walk",
             ),
         ),
         (Verdict(0.2, 2.0), ("from river to river the physical figure falls at 2.0 s, before any river changes",)),
