@@ -36,8 +36,8 @@ WELCOME = """hvf: a hand on a force-feedback arm feels an animation as a river, 
   hvf run --clips A.bvh B.amc         the same over your own motion capture
   hvf run --mode stretch-then-follow  bend a curve, and perform it
   hvf render runs/demo                film a run
-  hvf certify runs/demo               what is certain of its field: stability, passivity, energy
-  hvf clips                           the clips that are there
+  hvf certify runs/demo               certify its field: stability, passivity, energy
+  hvf clips                           list the embedded clips
 
 hvf --help lists all commands, hvf COMMAND --help the options of one."""
 """What ``hvf`` prints when it is called without arguments."""
@@ -110,8 +110,8 @@ def _interruption_message(command: Any) -> str:
     if isinstance(recorder, command_class("arm") | RunHardware) and (recorder.out / RECORDING).exists():
         return f"what was recorded until then is in {recorder.out}: hvf report {recorder.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
-        return f"trials that had ended are kept in {command.out}; the same command goes on from there"
-    return "nothing is left half done"
+        return f"finished trials are kept in {command.out}; the same command resumes from there"
+    return "no partial files are left"
 
 
 def command_class(name: str) -> Any:
@@ -160,10 +160,10 @@ def _refuse_empty(words: Sequence[str]) -> None:
     for before, word in zip(["hvf", *words], words, strict=False):
         if not word.strip() or re.fullmatch(r"--[\w.-]+=", word):
             option = word.strip("= ") or before
-            raise ParameterError(f"nothing is given behind {option}; expected a value")
+            raise ParameterError(f"nothing is given after {option}; expected a value")
     for word, following in itertools.pairwise([*words, "--"]):
         if word == "--clips" and following.startswith("--"):  # tyro would take the default clips
-            raise ParameterError("nothing is given behind --clips; expected one or more names")
+            raise ParameterError("nothing is given after --clips; expected one or more names")
 
 
 def _join_axis_values(words: Sequence[str]) -> list[str]:
@@ -193,12 +193,12 @@ def _shorten_message(message: str, words: Sequence[str]) -> str:
     command = words[0] if words and words[0] in commands.NAMES else "COMMAND"
     rewordings = (
         (r"PATH (.+?)\. \(required\)", r"PATH (\1),"),
-        (r"^Missing value for argument '(-\S+)'.*", r"nothing is given behind \1; expected a value"),
+        (r"^Missing value for argument '(-\S+)'.*", r"nothing is given after \1; expected a value"),
         (r"^Missing value for argument '.*", f"missing from hvf {command}: PATH, or an option is mistyped"),
     )
     for pattern, better in rewordings:
         first = re.sub(pattern, better, first).rstrip(",")
-    return f"{first[0].lower()}{first[1:]}; hvf {command} --help lists what there is"
+    return f"{first[0].lower()}{first[1:]}; hvf {command} --help lists the options"
 
 
 def _is_rule(line: str) -> bool:

@@ -276,7 +276,7 @@ class StretchyTubes(Law):
         checked("until", self.until, "s", infinite=True)
         checked("ease", self.ease, "s")
         if np.isfinite(self.until) and self.then is None:
-            raise ParameterError(f"stretching ends after {self.until} s; say by `then` how the curve is then performed")
+            raise ParameterError(f"stretching ends after {self.until} s; give `then`, how the curve is performed")
 
     def _compose(self) -> Program:
         """The memory contains the curve, which is deformed in place."""

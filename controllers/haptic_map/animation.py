@@ -103,7 +103,7 @@ class AnimationMap(ClipMap):
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
             if not 1 <= joint < len(groups):
-                raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group wants {joint}")
+                raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group needs {joint}")
             groups[joint] = 1
         frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in self.loops)
         samples = int(np.clip(np.ceil(frames), 64, 2048))

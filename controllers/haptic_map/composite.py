@@ -90,7 +90,7 @@ class Composite(AnimationMap):
         """A remark if only a share of red and blue is blended in."""
         if self.share == 1.0:
             return ()
-        return (f"the lower body bears {100 * self.share:.0f} % of the others' arms",)
+        return (f"the lower body is combined with {100 * self.share:.0f} % of the others' arm motion",)
 
     def with_share(self, share: float) -> "Composite":
         """The same map with another share λ of red and blue: 0 leaves the upper body to the lower clip.

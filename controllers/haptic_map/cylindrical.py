@@ -186,9 +186,9 @@ class Cylindrical(AnimationMap):
         if not self.upper:
             return ()
         owner = _ORDINALS[self.legs_of]
-        remark = f"the clips move differently: a mean of them is no motion, so legs and trunk are the {owner} clip's"
+        remark = f"the clips are too different to average, so legs and trunk are the {owner} clip's"
         if self.share < 1.0:
-            remark += f", which bear {100 * self.share:.0f} % of the others' arms"
+            remark += f", with {100 * self.share:.0f} % of the others' arm motion"
         return (remark,)
 
     def places(self, angles: Array) -> Array:

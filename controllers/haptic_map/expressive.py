@@ -193,7 +193,7 @@ class Expressive(Wrapped):
 
 def _checked_row(joint: ExpressiveJoint, last: int) -> Array:
     if not 1 <= joint.joint <= last:
-        raise ParameterError(f"the poses have joints 1 to {last}, expression wants to turn {joint.joint}")
+        raise ParameterError(f"the poses have joints 1 to {last}, expression needs joint {joint.joint}")
     gain, low, high = (np.asarray(numbers, dtype=np.float64) for numbers in (joint.gain, joint.low, joint.high))
     if gain.shape != (3,) or not np.isfinite(gain).all():
         raise ParameterError(f"gains of joint {joint.joint} must be three finite numbers, got {joint.gain}")

@@ -168,7 +168,7 @@ class Lifted(ClipMap):
             return ()
         owner, arms = self.names[self.legs_of], "the others' arms"
         what = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
-        return (f"legs and trunk are those of {owner} wherever the hand is pushed, which bear {what}",)
+        return (f"legs and trunk are those of {owner} wherever the hand is pushed, with {what}",)
 
     def with_legs_of(self, clip: int, upper: Sequence[int], share: float) -> "Lifted":
         """The same map with root and all joints but `upper` (counted from 1) from one clip, and a share λ of the rest.

@@ -135,7 +135,7 @@ class RiverClips(AnimationMap):
     ) -> None:
         if len(clips) != len(curves) or not curves:
             raise ParameterError(
-                f"a map of rivers wants a clip for each; got {len(clips)} clips and {len(curves)} rivers"
+                f"a map of rivers needs a clip for each; got {len(clips)} clips and {len(curves)} rivers"
             )
         opened = [i for i, curve in enumerate(curves) if not curve.periodic]
         if opened:

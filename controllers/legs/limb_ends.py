@@ -27,7 +27,7 @@ def end_poses(channels: Array, limb: Limb) -> tuple[Array, Array]:
     """Positions (n, m, 3) and orientations (n, m, 4) of a limb's end in remainders (n, m, nq)."""
     n, m, numbers = channels.shape
     if max(limb.joints) > (numbers - 7) // 4:
-        raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb wants {limb.joints}")
+        raise ParameterError(f"the poses have {(numbers - 7) // 4} joints, a limb needs {limb.joints}")
     place, turn = channels[..., :3].reshape(-1, 3), _joint_rotations(channels, 0)
     for joint, offset in zip(limb.joints, limb.offsets, strict=True):
         place = place + turn.apply(offset)

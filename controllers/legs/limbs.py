@@ -115,7 +115,7 @@ class Limb:
         """
         joint_count = min(((poses.shape[1] - 7) // 4 for poses in clips), default=max(self.joints))
         if max(self.joints) > joint_count:
-            raise ParameterError(f"the poses have {joint_count} joints, a limb wants {self.joints}")
+            raise ParameterError(f"the poses have {joint_count} joints, a limb needs {self.joints}")
         limits = self.limits.copy()
         for joint, interval in zip(self.joints, limits, strict=True):
             for poses in clips:

@@ -63,29 +63,29 @@ class Fault(IntEnum):
 
 _DESCRIPTIONS = {
     Fault.NONE: "no fault",
-    Fault.FORCE_NOT_FINITE: "the field asked for a force or moment of {:g}",
+    Fault.FORCE_NOT_FINITE: "the field requested a force or moment of {:g}",
     Fault.LIMITER_NOT_FINITE: "the limiter's memory held {:g}",
     Fault.TANK_NOT_FINITE: "the energy tank's memory held {:g}",
     Fault.READING_NOT_FINITE: "the device read {:g}",
-    Fault.RATE_IMPOSSIBLE: "a joint was read to turn at {:.4g} rad/s, which it cannot",
+    Fault.RATE_IMPOSSIBLE: "a joint speed of {:.4g} rad/s was read, which is impossible",
     Fault.READING_STALE: "the device gave no new reading for {:.3g} s",
     Fault.ENCODERS_FROZEN: "no encoder counted for {:.3g} s under a torque that moves the stylus",
     Fault.READINGS_ENDED: "the replayed hand had ended after {:.0f} ticks",
-    Fault.UNPLUGGED: "the device is gone",
+    Fault.UNPLUGGED: "the device was disconnected",
     Fault.CHECKSUM_WRONG: "{:.0f} reports in a row had a wrong checksum",
     Fault.SEQUENCE_BACK: "a reading came {:.0f} numbers behind the last one",
     Fault.OVER_TEMPERATURE: "a motor is at {:.0f} °C",
-    Fault.DEVICE_RESET: "the device began again by itself",
+    Fault.DEVICE_RESET: "the device restarted by itself",
     Fault.VERSION_WRONG: "the device speaks major version {:.0f} of the protocol",
     Fault.REPORT_MALFORMED: "a report of {:.0f} bytes",
-    Fault.DEVICE_REPORTED: "the device reported an error of its own, {:.0f}",
-    Fault.OSCILLATION: "the hand was shaken with {:.3g} N at the frequency of an instability",
+    Fault.DEVICE_REPORTED: "the device reported error {:.0f}",
+    Fault.OSCILLATION: "the force oscillated by {:.3g} N at the frequency of an instability",
     Fault.LEFT_WORKSPACE: "the stylus was {:.3g} m outside the workspace",
     Fault.TOO_FAST: "the stylus moved at {:.3g} m/s",
     Fault.MOTORS_HOT: "the motors have used {:.0%} of what they can dissipate",
     Fault.SERVO_LATE: "the servo was {:.3g} s late",
-    Fault.CONTROL_LOST: "the process that controls the run has not been heard for {:.3g} s",
-    Fault.MOTORS_OFF: "the device left its motors off for {:.3g} s after it was told to switch them on",
+    Fault.CONTROL_LOST: "the process that controls the run has not answered for {:.3g} s",
+    Fault.MOTORS_OFF: "the device left its motors off for {:.3g} s after the command to switch them on",
     Fault.CLOCK_BACK: "the device's clock went back by {:.3g} s",
 }
 
@@ -312,7 +312,7 @@ class LatchedFault:
 
     def line(self) -> str:
         """The fault as a sentence."""
-        return f"The device let go at {self.t:.3f} s: {self.fault.words(self.value)}."
+        return f"The motors were switched off at {self.t:.3f} s: {self.fault.words(self.value)}."
 
 
 def latched(faults: Array) -> LatchedFault | None:

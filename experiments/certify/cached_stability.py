@@ -15,7 +15,7 @@ from experiments.setups.certified_law import governor_drag, uncertified_parts
 from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import results_folder
 
-_LEADING_REASON = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
+_LEADING_REASON = "leading is certified per regime, for the led clip: hvf certify --mode lead"
 
 
 @dataclass(frozen=True)

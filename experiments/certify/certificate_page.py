@@ -50,8 +50,8 @@ def region_figure(verdict: Verdict) -> Figure:
         label = "region, firm hands" if "firm_hands" in verdict.figures else "region"
         axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4", label=label)
         axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3")
-        axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
-        axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
+        axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball reached")
+        axes.set(xlabel="offset across the curve [mm]", ylabel="speed error [m/s]")
         axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
         axes.legend(frameon=False, fontsize=8, loc="upper right")
     return figure

@@ -18,7 +18,7 @@ from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 
 PLAYED = "as played"
-_PACE_ASSUMPTION = "clips are judged at their own pace, what a run played as it was played, its first second left out"
+_PACE_ASSUMPTION = "clips are judged at their recorded speed, a run at its played speed without the first second"
 _FPS = 125.0  # frame rate at which a played animation is judged [1/s]
 _MAX_DURATION = 120.0  # longest part of it that is judged [s]
 

@@ -26,7 +26,7 @@ from models.mocap.motion.clip import Clip
 DIRECTIONS = 0.25 * np.pi * np.arange(4)
 _ASSUMPTIONS = (
     "k_r is LEADING's k_l, with k_z in proportion; b_d is its b",
-    "the figure is frozen: it moves at a speed of its own, at a bound of its speed or its pull; where it follows "
+    "the figure is frozen: its speed is independent of the hand, or it or its pull is at a bound; where it follows "
     "freely (walker_radius) it is part of the state",
 )
 
@@ -116,7 +116,7 @@ def leading_energy(field: Leading) -> Verdict:
     """
     force = ForceLimiter(1e-3).peak
     if field.b == 0.0:
-        return Verdict("unknown", "without damping nothing bounds the power: ahead and aside there is no potential")
+        return Verdict("unknown", "without damping the power is unbounded: ahead and aside there is no potential")
     power = force**2 / (4.0 * field.b)
     reason = (
         f"while the springs pull at most {force:g} N they give a hand at most {power:.3g} W, and drive it at most at "

@@ -45,7 +45,7 @@ from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
-_MOMENT_ASSUMPTION = "the moment on the stylus (--orientation-*) is not felt: the device has motors for a force only"
+_MOMENT_ASSUMPTION = "the moment on the stylus (--orientation-*) has no effect: the device's motors give a force only"
 PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
@@ -175,7 +175,7 @@ def _existing_certificate(out: Path, inputs: Mapping[str, object]) -> Certificat
         If the folder has a page of that name without a certificate.
     """
     if (out / PAGE).exists() and not (out / CERTIFICATE).exists():
-        raise SimError(f"{out / PAGE}: is there already, without a certificate; choose another --out, or move it")
+        raise SimError(f"{out / PAGE}: already exists, without a certificate; choose another --out, or move it")
     if not ((out / CERTIFICATE).exists() and (out / PAGE).exists()):
         return None
     try:
@@ -202,7 +202,7 @@ def _field_verdicts(
     """The law that the stability figure shows, and all verdicts on the field."""
     if isinstance(config.mode, Lead):
         if not clips:
-            raise ParameterError("a certificate of leading is of a clip that is led; give one")
+            raise ParameterError("leading is certified for the clip that is led; give one")
         field, curve = leading_field(config, config.mode, clips[0]), certified_curves(config)[""]
         device, sampling = phantom_device(linkage_of(config.device)), certified_sampling(config, delay)
         main = leading_river(field, leading_regimes(field)[""][0], curve, device, sampling)

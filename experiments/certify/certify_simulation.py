@@ -144,7 +144,7 @@ def _check_executed(
     try:
         return check_executed(sim.field.program(), place, reach, verdict, hands)
     except NotExecutable:
-        reason = "a law of one's own keeps numbers of the hand between calls"
+        reason = "a user-defined law keeps numbers of the hand between calls"
         return Verdict("unknown", f"{verdict.reason}; {reason}" if verdict.verdict == "unknown" else reason)
 
 
@@ -189,9 +189,9 @@ def _field_parts(field: Law) -> _FieldParts:
     others = [type(law).__name__ for law in laws if not isinstance(law, known)]
     if len(leading) != 1 or others or len(governors) > 1:
         names = ", ".join(others) or ", ".join(type(law).__name__ for law in leading) or "no law along a curve"
-        raise ControllerError(f"a certificate is of one FOLLOW or bunny, and laws of one's own; the field has {names}")
+        raise ControllerError(f"a certificate covers one FOLLOW or bunny, and user-defined laws; the field has {names}")
     if governors and not np.array_equal(governors[0].curve.packed(), leading[0].curve.packed()):
-        raise ControllerError("a governor is certified on the curve of the law beside it; it has another one")
+        raise ControllerError("a governor is certified on the curve of the law beside it; this one has another")
     for law, factor in scaled:
         if isinstance(law, Follow | Bunny | Governor) and factor < 0.0:
             raise ControllerError(
@@ -216,9 +216,9 @@ def _field_assumptions(field: Law, added: Sequence[Cases]) -> tuple[str, ...]:
         )
     ]
     if any(isinstance(what, Orientation) for what, _ in scaled) or any(cases.exerts_moment for cases in added):
-        assumed.append("the moment on the stylus is not felt: the device has motors for a force only")
+        assumed.append("the moment on the stylus has no effect: the device's motors give a force only")
     if added:
-        assumed.append("the critical gain is one by which the whole field is scaled, laws of one's own included")
+        assumed.append("the critical gain is one by which the whole field is scaled, user-defined laws included")
     return tuple(assumed)
 
 

@@ -62,7 +62,7 @@ def check_executed(program: Program, main: River, reach: float, verdict: Verdict
         f"no oscillation grows at {judged} states of the program{limit_text}" if judged else "no state can be judged"
     )
     if abrupt:
-        summary += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, bends or is no number"
+        summary += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, is kinked or is no number"
     far = examine_curve(program, main, reach, hands.hands(), MAX_SPEED_RATIO)
     if far.radius >= 1.0:
         summary += f", but not for a hand {_place(main, far)}"

@@ -27,17 +27,17 @@ def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[Han
     worst = min(verdicts, key=lambda verdict: np.inf if verdict.margin is None else verdict.margin)
     for verdict in verdicts:
         if verdict.verdict != "certified":
-            reason = f"in one of {len(rivers)} cases of laws of one's own it is {verdict.verdict}: {verdict.reason}"
+            reason = f"in one of {len(rivers)} cases of user-defined laws it is {verdict.verdict}: {verdict.reason}"
             return Verdict("unknown", reason, None, verdict.assumptions)
     uncovered = _first_without_common(rivers, drag, hands)
     if uncovered is not None:
         phase, hand = uncovered
         reason = (
-            f"stable in each of {len(rivers)} cases of laws of one's own, but switching between them is not certified: "
+            f"stable in each of {len(rivers)} cases of user-defined laws, but switching between them is not certified: "
             f"no common Lyapunov function was found at phase {phase:.3g} s with {hand}; {worst.reason}"
         )
         return Verdict("unknown", reason, None, worst.assumptions)
-    reason = f"{worst.reason}, the least of {len(rivers)} cases of laws of one's own; so is any switching between them"
+    reason = f"{worst.reason}, the least of {len(rivers)} cases of user-defined laws; so is any switching between them"
     return replace(worst, reason=reason)
 
 

@@ -33,12 +33,12 @@ def _refuse_options(names: Sequence[str], beside: str, owner: str) -> None:
 
 @part
 class Command:
-    """Say what is certain of a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
+    """Certify a field, a run, a map or the flights of a clip: certified, refuted or unknown."""
 
     options: Options = field(default_factory=RunOptions)  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """The field."""
     run: Positional[Path | None] = None
-    """Folder of a run, whose field and clips are certified, as they were recorded."""
+    """Folder of a run whose field and clips are certified as recorded."""
     clip: str | None = None
     """Judge this motion instead of a field: a file, or the name of an embedded clip."""
     out: Path | None = None
@@ -47,15 +47,15 @@ class Command:
     overwrite: bool = False
     """Replace a certificate of something else that the folder holds."""
     delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
-    """Of the motors' torques, for a field [s]."""
+    """Delay of the motors' torques, for a field [s]."""
     hand_push: Annotated[float, at_least(0.0, unit="N")] = 1.0
     """Largest force of the hand for which the distance from the curve is bounded [N]."""
     hand: HandRange = field(default_factory=HandRange)
-    """Intervals of the impedance of the hands that may hold the stylus."""
+    """Impedance intervals of the hands that may hold the stylus."""
     no_hand: bool = False
-    """Certify for nobody's hand on the stylus."""
+    """Certify a stylus without a hand."""
     tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
-    """What passes for a flight."""
+    """What counts as a flight."""
     friction: Annotated[float, above(0.0)] = JudgementCriteria.friction
     """Coefficient of friction of soles on the floor, for clips [1]."""
     verify: Path | None = None
@@ -76,7 +76,7 @@ class Command:
                 return 1
         lines = [f"{name}: {verdict.verdict}; {verdict.reason}" for name, verdict in certificate.verdicts.items()]
         if self.verify is not None:
-            lines.insert(0, f"{self.verify}: all that it is of is as it was")
+            lines.insert(0, f"{self.verify}: valid, nothing that it covers has changed")
         say(certificate.to_json(), self.json, lines)
         return 0
 

@@ -7,7 +7,7 @@ from experiments.console.output import Json, say
 
 @dataclass(frozen=True)
 class Command:
-    """Name the embedded clips."""
+    """List the embedded clips."""
 
     json: Json = False
 

@@ -17,11 +17,11 @@ class Command:
     target: Positional[Path]
     """File to write: .bvh, or .glb for glTF."""
     up: str | None = None
-    """The file's axis that points up, such as +Y, where the motion does not tell."""
+    """The file's up axis, such as +Y, if it cannot be inferred from the motion."""
     rest_frame: int | None = None
-    """A frame in which the body stands upright with level feet, where the motion does not tell."""
+    """A frame in which the body stands upright with level feet, if none can be found."""
     roles: Path | None = None
-    """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
+    """TOML file that assigns joints to roles, such as left_thigh = "Bone.012", if their names are unknown."""
     frame_rate: float | None = None
     """Frames per second, where the file does not state them (AMC) or states them wrongly [Hz]."""
     overwrite: bool = False

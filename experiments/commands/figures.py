@@ -10,9 +10,9 @@ class Command:
     """Draw Figures 1 to 8 of the paper from runs of this program, as PDF and PNG with a page of them."""
 
     out: Path = Path("runs/figures")
-    """Folder to write; runs that lie in its folder runs are drawn as they are, those that are missing are made."""
+    """Folder to write; runs in its folder runs are drawn as they are, missing ones are made."""
     overwrite: bool = False
-    """Draw again what is there; the runs are kept."""
+    """Draw existing figures again; the runs are kept."""
 
     def __call__(self) -> int:
         """Draw."""

@@ -13,7 +13,7 @@ from experiments.hardware.run_options import CalibrateHardware, IdentifyHardware
 
 @dataclass(frozen=True)
 class ListDevices:
-    """Name every device that this machine sees, and how to open it; nothing is sent to any."""
+    """List every device that this machine sees, and how to open it; nothing is sent to them."""
 
     json: bool = False
     """Print them as JSON."""
@@ -36,10 +36,10 @@ class ListDevices:
 
 @part
 class Doctor:
-    """Say what is missing to drive a device from this machine, and measure how late the machine is."""
+    """Report what is missing to drive a device from this machine, and measure the machine's lateness."""
 
     device: str | None = None
-    """Also open this device, and measure how it answers with its motors off; a name of `hvf hardware list`."""
+    """Also open this device, and measure its response times with its motors off; a name of `hvf hardware list`."""
     seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
     """How long to measure, an hour at most [s]."""
     json: bool = False
@@ -79,7 +79,7 @@ class Doctor:
             f"{lateness.missed} deadlines missed"
         )
         if identity is not None and link is not None:
-            watchdog = "" if identity.watchdog or not identity.forces else "; no watchdog of its own"
+            watchdog = "" if identity.watchdog or not identity.forces else "; no watchdog"
             calibrated = "" if identity.calibrated else "; not calibrated"
             print(f"link     {identity.name} {identity.serial} ({identity.transport}){watchdog}{calibrated}")
             for line in link.lines():
@@ -100,7 +100,7 @@ class RunDevice(RunHardware):
 
 @part
 class CalibrateDevice(CalibrateHardware):
-    """Read where the encoders' zero is while the stylus stands at a known pose, and keep it in a device file."""
+    """Measure the encoders' zero while the stylus is at a known pose, and save it in a device file."""
 
     def __call__(self) -> int:
         """Calibrate."""
@@ -111,7 +111,7 @@ class CalibrateDevice(CalibrateHardware):
 
 @part
 class IdentifyDevice(IdentifyHardware):
-    """Find friction, inertia, delay and encoder offset of a device in recordings of it with no hand on the stylus."""
+    """Identify friction, inertia, delay and encoder offset of a device from recordings with no hand on the stylus."""
 
     def __call__(self) -> int:
         """Identify."""
@@ -131,7 +131,7 @@ Which = (
 
 @dataclass(frozen=True)
 class Command:
-    """Real devices: which there are, whether this machine can drive one, running one, and finding out what it is."""
+    """Real devices: list them, check this machine, run one, calibrate it and identify its parameters."""
 
     which: tyro.conf.OmitArgPrefixes[tyro.conf.OmitSubcommandPrefixes[Which]]
 

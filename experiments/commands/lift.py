@@ -23,9 +23,9 @@ class Command:
     room: Room = field(default_factory=Room)
     """Where curves may be, and how near to each other and how fast."""
     cyclic: tuple[str, ...] = ()
-    """Clips that have to close; by default all those are closed curves that do."""
+    """Clips that must close; by default all that can."""
     seed: Annotated[int, whole_number(0)] = 1
-    """Of the places from which the arrangement begins."""
+    """Seed of the initial arrangement."""
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     overwrite: bool = False

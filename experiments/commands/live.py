@@ -14,7 +14,7 @@ class Command:
     options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""
     port: Annotated[int, whole_number(0, 2**16)] = 8080
-    """Of the page; the next free one is taken if it is in use."""
+    """Port of the page; the next free one is used if it is taken."""
     host: str = "127.0.0.1"
     """Address to listen on; on any but this machine's own, the page asks for a token, which is printed."""
     out: Path = Path("runs/live")

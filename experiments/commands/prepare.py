@@ -12,22 +12,22 @@ from experiments.console.progress import working
 
 @dataclass(frozen=True)
 class Command:
-    """Make a well-formed clip of anybody's capture: on the floor, looped or at rest, feasible on contact alone."""
+    """Make a well-formed clip from a capture: on the floor, looped or at rest, feasible by contact forces alone."""
 
     source: Annotated[Path, tyro.conf.Positional]
     """Motion file to read: BVH, AMC (with its ASF beside it) or DeepMimic."""
     target: Annotated[Path, tyro.conf.Positional]
     """BVH file to write."""
     loop: str = "auto"
-    """How it goes on: auto, open, or START:END of the cycle, in seconds from the first frame that is kept."""
+    """How it continues: auto, open, or START:END of the cycle, in seconds from the first frame that is kept."""
     mirror: bool = False
-    """Go on with the mirror image of half a stride, or of START:END, as walks and runs do."""
+    """Continue with the mirror image of half a stride, or of START:END, as walks and runs do."""
     up: str | None = None
-    """The file's axis that points up, such as +Y, where the motion does not tell."""
+    """The file's up axis, such as +Y, if it cannot be inferred from the motion."""
     rest_frame: int | None = None
-    """A frame in which the body stands upright with level feet, where the motion does not tell."""
+    """A frame in which the body stands upright with level feet, if none can be found."""
     roles: Path | None = None
-    """TOML file of which joint is which, such as left_thigh = "Bone.012", where the joints' names do not tell."""
+    """TOML file that assigns joints to roles, such as left_thigh = "Bone.012", if their names are unknown."""
     frame_rate: float | None = None
     """Frames per second, where the file does not state them (AMC) or states them wrongly [Hz]."""
     report: Annotated[Path | None, tyro.conf.arg(aliases=["--out-report"])] = None

@@ -20,15 +20,15 @@ class Command:
     gif: bool = False
     """Write a GIF beside it as well, half as large, every second frame."""
     show: Literal["both", "workspace", "stage"] = "both"
-    """What is seen."""
+    """What to show."""
     camera: Literal["three-quarter", "front", "side", "back", "above"] = "three-quarter"
-    """From where the figure is seen, with respect to where it faces."""
+    """Camera position relative to where the figure faces."""
     ghost: Literal["default", "animation", "none"] = "default"
-    """What stands beside the figure: the curve's own animation, that of the hand's path, or nobody."""
+    """What to show beside the figure: the curve's own animation, that of the hand's path, or nothing."""
     start: float = 0.0
-    """Of what is shown [s]."""
+    """Time in the run at which the film starts [s]."""
     seconds: float | None = None
-    """Of what is shown [s]; to the end by default."""
+    """Duration of the film [s]; by default to the end."""
     width: int = 1280
     """Of a frame [pixels]."""
     height: int = 720

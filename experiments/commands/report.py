@@ -12,7 +12,7 @@ from experiments.results.folder import REPORT
 
 @dataclass(frozen=True)
 class Command:
-    """Draw the figures and the page of a run again; of a run that was stopped, also write summary and animations."""
+    """Draw the figures and the page of a run again; for a run that was stopped, also write summary and animations."""
 
     folder: Positional[Path]
     """Folder of a run."""

@@ -10,7 +10,7 @@ from experiments.console.startup import STARTED
 
 @dataclass(frozen=True)
 class Command:
-    """Run a hand, a field, a map and a figure, and write what happened into a folder."""
+    """Simulate a hand, a field, a map and a figure, and write the results into a folder."""
 
     options: Options  # pyright: ignore[reportInvalidTypeForm] - made of the parts
     """What is run."""

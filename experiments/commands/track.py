@@ -22,9 +22,9 @@ class Command:
     raw: bool = False
     """Take motion files as captured; by default they are prepared once, as by hvf prepare."""
     residual_force: Annotated[float, at_least(0.0)] = _GAINS.force_bound
-    """Largest force at the root beside ground and joints, as a share of body weight [1]."""
+    """Largest residual force at the root, as a fraction of body weight [1]."""
     residual_moment: Annotated[float, at_least(0.0)] = _GAINS.moment_bound
-    """Largest such moment, as a share of body weight × stature [1]."""
+    """Largest residual moment, as a fraction of body weight × stature [1]."""
     json: Json = False
 
     def __call__(self) -> int:

@@ -12,16 +12,16 @@ from experiments.trials.execution.where import Where
 
 @part
 class Command(Where):
-    """Run a study of simulated people from a TOML file, or go on with one that was stopped, and report on it."""
+    """Run a study of simulated people from a TOML file, or resume one that was stopped, and report on it."""
 
     study: Annotated[Path, tyro.conf.Positional]
     """TOML file of the study; see docs/how-to/user-studies.md."""
     out: Path = Path("runs/study")
     """Folder of database, tables and report; one that holds this study is continued."""
     users: Annotated[int | None, whole_number(1)] = None
-    """How many users, in place of the study's number."""
+    """Number of users, instead of the study's."""
     seed: Annotated[int | None, whole_number(0)] = None
-    """Of population and trials, in place of the study's."""
+    """Seed of population and trials, instead of the study's."""
     json: Json = False
 
     def __call__(self) -> int:

@@ -12,14 +12,14 @@ from experiments.trials.execution.where import Where
 
 @part
 class Command(Where):
-    """Tune numbers of a run on simulated people, within what is certified, or go on with a tuning that was stopped."""
+    """Tune parameters of a run on simulated people, among certified ones, or resume a tuning that was stopped."""
 
     tuning: Annotated[Path, tyro.conf.Positional]
     """TOML file of the tuning; see docs/how-to/tuning.md."""
     out: Path = Path("runs/tune")
     """Folder of journal, database, report and the chosen configuration; one that holds this tuning is continued."""
     candidates: Annotated[int | None, whole_number(1)] = None
-    """How many are simulated, in place of the tuning's number."""
+    """Number of candidates, instead of the tuning's."""
     json: Json = False
 
     def __call__(self) -> int:

@@ -10,14 +10,14 @@ from experiments.console.progress import working
 
 @part
 class Command:
-    """Hold simulated people against the published laws of human movement: a table, and a figure each."""
+    """Compare simulated people with published laws of human movement: a table, and a figure each."""
 
     out: Path = Path("runs/users")
     """Folder to write."""
     people: Annotated[int, whole_number(1)] = 6
-    """How many people of a population take part."""
+    """Number of people of a population."""
     seed: Annotated[int, whole_number(0)] = 1
-    """Of the population and of its noise."""
+    """Seed of the population and of its noise."""
     laws: tuple[str, ...] = ()
     """fitts, scatter, steering, power-law, tremor, step-response, grip, practice, endurance; all by default."""
     overwrite: bool = False

@@ -14,9 +14,9 @@ class Circle:
     Parameters
     ----------
     lap : float
-        Time of a lap [s]; in less than a tenth of a second no hand goes round.
+        Time of a lap [s]; in less than a tenth of a second no hand completes one.
     radius : float
-        Of the circle [m].
+        Radius of the circle [m].
     wave : float
         How far it goes up and down, three times a lap, so that every joint of the device turns [m].
     """
@@ -119,7 +119,7 @@ class MapFile(_WithoutClips):
     file : str
         The file (.npz).
     curve : str
-        Of a lifted map, the curve that the run begins on, and that a single one follows: a clip's name or number; by
+        Curve of a lifted map, on which the run begins, and which a single one follows: a clip's name or number; by
         default the first. It is timed by the clip.
     around, reach, expressive
         As in `Cylindrical`, for a map that has no curves of its own.

@@ -16,9 +16,9 @@ class OrientationMoment:
     Parameters
     ----------
     orientation_stiffness : float
-        Of the moment towards the curve's orientation [N m/rad].
+        Stiffness of the moment towards the curve's orientation [N m/rad].
     orientation_damping : float
-        Of the stylus's turning with respect to the curve's [N m s/rad].
+        Damping of the stylus's rotation relative to the curve's [N m s/rad].
     """
 
     orientation_stiffness: float = at_least(0.0, default=0.0, unit="N m/rad")
@@ -32,7 +32,7 @@ class SpeedGovernor:
     Parameters
     ----------
     governor_drag : float
-        Of the hand's speed beyond what is admissible [N s/m].
+        Drag on the hand's speed beyond what is admissible [N s/m].
     """
 
     governor_drag: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
@@ -56,11 +56,11 @@ class JointWalls:
     Parameters
     ----------
     wall_stiffness : float
-        Of a joint beyond its limit [N m/rad].
+        Stiffness of a joint beyond its limit [N m/rad].
     wall_margin : float
-        Before a limit, where the wall begins [rad].
+        Distance before a limit at which the wall begins [rad].
     joint_speed : float
-        Greatest speed of a joint without resistance [rad/s].
+        Largest speed of a joint without resistance [rad/s].
     """
 
     wall_stiffness: float = at_least(0.0, default=0.1, unit="N m/rad")
@@ -81,7 +81,7 @@ class Follow:
     tube : float
         ε, beyond which the field ends [m].
     flow : {"curve", "parallel"}
-        Off the curve, the curve's velocity; or that of its parallel, with which a hand that is pushed off keeps the
+        Velocity off the curve: the curve's, or that of its parallel, with which a hand that is pushed off keeps the
         curve's pace, by default on composites and maps from a file.
     orientation, governor, walls
         What is added, if anything.
@@ -110,7 +110,7 @@ class Bunny:
     bunny_width : float
         δ of its Gaussian [m].
     bunny_attraction : {"point", "along", "convolution"}
-        To the bunny itself, or to the curve beside the hand; or to the bunny as the paper writes it, convolved.
+        Towards the bunny itself, the curve beside the hand, or the bunny convolved with a Gaussian, as in the paper.
     bunny_pace : {"clock", "wait"}
         Whether it keeps the clock's pace, or waits for the hand.
     orientation, governor, walls
@@ -130,7 +130,7 @@ class Bunny:
 
 @part
 class Rivers:
-    """Several crossing rivers, of which one has the hand.
+    """Several crossing rivers, of which one acts on the hand.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Rivers:
 
 @part
 class Stretch:
-    """A curve that is sought, taken hold of and bent like rubber.
+    """A curve that attracts the hand, can be grabbed and bends like rubber.
 
     Parameters
     ----------
@@ -173,10 +173,10 @@ class Stretch:
     rubber : float
         k_s of a held or pushed tube [N/m].
     tube_damping : float, optional
-        Of the search and of the tube [N s/m]; by default 14, and 20 on a map from a file.
+        Damping of the search and of the tube [N s/m]; by default 14, and 20 on a map from a file.
     rubber_from : {"curve", "stylus"}
-        Where a held tube pulls to: the point of the curve that was taken hold of, or, as in the paper, the place of the
-        stylus when it did so.
+        Where a held tube pulls to: the point of the curve that was grabbed, or, as in the paper, the position of the
+        stylus at that moment.
     rubber_tube : float
         Radius of the tube that can be held and pushed [m].
     bump : float
@@ -197,7 +197,7 @@ class Stretch:
 
 @part
 class StretchThenFollow:
-    """A curve that is bent, and performed by FOLLOW when the hand has done with it.
+    """A curve that is bent, and performed by FOLLOW when the hand has finished.
 
     Parameters
     ----------
@@ -231,9 +231,9 @@ class Lead:
     leash : float
         k_l, of the force that keeps the hand from running ahead [N/m].
     damping : float
-        Of the hand [N s/m].
+        Damping of the hand [N s/m].
     floor_scale : float, optional
-        Metres of floor for one of the stylus [1]; by default such that the figure goes along the default S in 5 s.
+        Metres of floor per metre of the stylus [1]; by default such that the figure goes along the default S in 5 s.
     """
 
     kind: Literal["lead"] = "lead"

@@ -285,7 +285,7 @@ def _options() -> Iterator[tuple[str, Any, Any]]:
     yield option("config", Path | None, CONFIG_HELP, None)
     yield option("mode", str, "Field of force: " + ", ".join(_parts_by_kind(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, robot-arm, or a map's file (.npz).", "")
-    yield option("user", str, "The simulated hand: " + ", ".join(_USER_KINDS) + "; the last five of a person.", "")
+    yield option("user", str, "The simulated hand: " + ", ".join(_USER_KINDS) + "; the last five need a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("replay", str, "Folder of a run whose hand is replayed: it moves as recorded, whatever the force.", "")

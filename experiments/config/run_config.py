@@ -34,10 +34,10 @@ class User:
         one that leads a figure. A person also exaggerates here and calms there, cuts a corner, changes over to another
         motion, resists, or gets lost and comes back.
     pushes : tuple of Push
-        By default of a hand that pushes: outwards and inwards once a lap from the second lap on; on rivers over into
+        By default, for a hand that pushes: outwards and inwards once a lap from the second lap on; on rivers over into
         another one; on the rivers of a lifted map at the best transition, and three laps later back.
     turns : tuple of Turn
-        By default of a hand that turns: one lap to the left and right, one down and up, one over to either side.
+        By default, for a hand that turns: one lap to the left and right, one down and up, one over to either side.
     grabs : tuple of Grab
         By default, where a curve is stretched: a tour of what can be done.
     person : Person, optional
@@ -116,17 +116,17 @@ class Figure:
     stature : float
         Height of the figure [m]; it moves as the clips do, in proportion.
     mass : float
-        Of the figure [kg].
+        Mass of the figure [kg].
     smoothing : float
         Bandwidth of the filter between stylus and figure [Hz].
     figure_ticks : int
         Servo ticks between two updates of the figure, between which a foot may land.
     blend : float
-        Time in which one clip goes over into another [s].
+        Duration of the blend from one clip to another [s].
     residual_force : float
-        Largest force at the root beside ground and joints, as a share of body weight [1]; 0: none.
+        Largest residual force at the root, as a fraction of body weight [1]; 0: none.
     residual_moment : float
-        Largest such moment, as a share of body weight × stature [1].
+        Largest residual moment, as a fraction of body weight × stature [1].
     """
 
     kind: FigureKind = "physical"
@@ -189,7 +189,7 @@ class Phantom:
     cutoff : float
         Corner frequency of its velocity filter [Hz].
     device_file : str
-        What `hvf hardware identify` found of it; by default it is as published.
+        Parameters from `hvf hardware identify`; by default the published ones.
     """
 
     kind: Literal["phantom"] = "phantom"
@@ -284,7 +284,7 @@ class RunConfig:
     seconds : float
         Simulated time [s].
     seed : int
-        Of where exactly the hand lets go of the stylus at the start; a replayed hand has none.
+        Seed of the exact place where the hand starts; a replayed hand has none.
     """
 
     mode: Mode = Follow()
@@ -314,7 +314,7 @@ class RunConfig:
             if isinstance(self.mode, StretchThenFollow):
                 raise ParameterError(
                     "the mode stretch-then-follow performs when the simulated hand has bent the curve, and a replayed "
-                    "hand does not tell when; expected another mode, such as stretch"
+                    "hand does not determine when; expected another mode, such as stretch"
                 )
 
     @property

@@ -22,7 +22,7 @@ def _compile_missing(console: Console, units: Sequence[Unit]) -> None:
     waiting = list(missing_units(units))
     if not waiting:
         return
-    console.print("Compiling what this run needs; it is kept until that changes.")
+    console.print("Compiling what this run needs; the result is cached.")
     columns = (TextColumn("compiling"), BarColumn(), TextColumn("{task.completed} of {task.total}"))
     time_columns = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[names]}"))
     with Progress(*columns, *time_columns, console=console) as progress:

@@ -37,7 +37,7 @@ def cost_estimate(out: Path, seconds: float, groups: Mapping[str, Group]) -> str
     real_time = None if a_second is None else a_second * seconds
     if size < _MIN_ANNOUNCED_SIZE and (real_time or 0.0) < _MIN_ANNOUNCED_TIME:
         return None
-    time = "" if real_time is None else f"about {_duration_text(real_time)} at the pace of the last run, and "
+    time = "" if real_time is None else f"about {_duration_text(real_time)} at the speed of the last run, and "
     return (
         f"{seconds:g} s of simulated time take {time}{_size_text(size)} of disk; "
         f"{_size_text(_free_bytes(out))} are free"

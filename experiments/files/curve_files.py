@@ -36,4 +36,4 @@ def load_curve(path: Path) -> Trajectory:
     except CurveError as error:
         raise CurveError(f"{path}: {error}") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise SimError(f"{path}: no curve ({error}); expected JSON with {', '.join(keys)}") from None
+        raise SimError(f"{path}: not a curve ({error}); expected JSON with {', '.join(keys)}") from None

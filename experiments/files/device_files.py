@@ -49,7 +49,7 @@ class Calibration(NamedTuple):
         if (self.name, self.serial) != (identity.name, identity.serial):
             return f"is calibrated for {self.name} {self.serial}".rstrip()
         if self.power_up != identity.power_up and not identity.calibrated:
-            return "was calibrated before the device was switched off, and its encoders count from where they wake up"
+            return "was calibrated before the device was switched off, and its encoders count from where they power up"
         return ""
 
 
@@ -125,7 +125,7 @@ def read_device_file(path: Path) -> dict[str, Any]:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected a device file") from None
     except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         raise SimError(
-            f"{path}: no device file ({error}); expected what hvf hardware identify or calibrate writes"
+            f"{path}: not a device file ({error}); expected what hvf hardware identify or calibrate writes"
         ) from None
     return cast(dict[str, Any], content)
 

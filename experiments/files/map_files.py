@@ -65,7 +65,7 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected the .npz file of a map") from None
     except (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        raise SimError(f"{path}: is no file of a map, or damaged; expected what hvf lift writes") from None
+        raise SimError(f"{path}: is not a map file, or damaged; expected what hvf lift writes") from None
     if version != VERSION:
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
     if kind not in _KINDS:

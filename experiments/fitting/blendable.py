@@ -38,9 +38,9 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
         flight = longest_flight(clip)
         if clip.turns_over:
             fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.min_pelvis_cosine)):.0f}° from upright)"
-            lines.append(f"{clip.name} {fault}: no motion lies between it and others")
+            lines.append(f"{clip.name} {fault}: it cannot be blended with others")
         elif flight > MAX_FLIGHT_TIME:
-            lines.append(f"{clip.name} flies for {flight:.2f} s: no motion lies between it and what stays on the floor")
+            lines.append(f"{clip.name} flies for {flight:.2f} s: it cannot be blended with what stays on the floor")
     return tuple(lines)
 
 
@@ -101,4 +101,4 @@ def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int
         else "no lap suits them all better"
     )
     played = f"a lap of {lap:.1f} s plays" if laps == 1 else f"{laps} laps of {lap:.1f} s play"
-    return (f"{played} {', '.join(outside)} times its own pace; {better}",)
+    return (f"{played} {', '.join(outside)} times its recorded speed; {better}",)

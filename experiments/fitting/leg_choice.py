@@ -78,7 +78,7 @@ def select_legs(
                     best, name, best_verdict = made, names[i], verdict
             if best_verdict.bearable:
                 return best, ()
-    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best that is found at this lap",)
+    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)
 
 
 def followed_map(
@@ -118,4 +118,4 @@ def followed_map(
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with what it bears best",)
+    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with the best part of it",)

@@ -57,7 +57,7 @@ def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: m
     if verdict.bearable:
         return ()
     stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0
-    change = f"{names[_ORDER[stop - 1]]} gives way to {names[_ORDER[stop]]}"
+    change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"
     after = f", {verdict.fell - _DWELL_TIME * stop:.1f} s after {change}"
     where = after if stop else ", before any river changes" if verdict.falls else ""
     return (f"from river to river the physical figure {verdict}{where}",)

@@ -94,7 +94,9 @@ class Verdict(NamedTuple):
 
     def __str__(self) -> str:
         """In words, as the end of a sentence about the figure."""
-        return f"falls at {self.fell:.1f} s" if self.falls else f"lacks {100 * self.residual:.0f} % of weight"
+        return (
+            f"falls at {self.fell:.1f} s" if self.falls else f"has a residual of {100 * self.residual:.0f} % of weight"
+        )
 
 
 class Trial(NamedTuple):

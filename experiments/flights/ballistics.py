@@ -70,7 +70,7 @@ class ClipBallistics:
         verdicts = [f"{name}: {found.verdict}; {found.reason}" for name, found in self.certificate.verdicts.items()]
         rates = [
             f"flight at {flight.fit.time:.2f} s: seen as natural {_rates_text(flight.seen)} of its speed, can be done "
-            f"{_rates_text(flight.done)}; true gravity asks for a take-off at {flight.fit.take_off_speed:.2f} m/s, "
+            f"{_rates_text(flight.done)}; true gravity requires a take-off at {flight.fit.take_off_speed:.2f} m/s, "
             f"recorded {flight.fit.take_off[2]:.2f}"
             for flight in self.flights
         ]

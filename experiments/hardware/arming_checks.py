@@ -8,7 +8,7 @@ from controllers.errors import ParameterError
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options
 from experiments.config.options import given_options
-from experiments.config.run_config import RunConfig, meaningless_options
+from experiments.config.run_config import FIGURE_DEFAULTS, RunConfig, meaningless_options
 from experiments.files.certificate_files import changed_options, verify_certificate
 from experiments.files.device_files import Calibration, linkage_of
 from experiments.hardware.run_options import EMULATED, RunHardware, check_emulate
@@ -47,7 +47,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
     found_delay = linkage_of(config.device).delay
     if delay < found_delay:
         raise SimError(
-            f"the device file tells of a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
+            f"the device file has a delay of {found_delay:.2g} s; expected --delay {found_delay:.2g} or more, "
             "here and in hvf certify"
         )
     clips: tuple[Clip, ...] = ()
@@ -62,7 +62,7 @@ def verified(certificate: Path, config: RunConfig, delay: float) -> Certificate:
         raise ChangedInputs(f"{file} certifies another field or device: {changes}; certify this one") from None
     stable = {name: verdict for name, verdict in found.verdicts.items() if name.startswith("stability")}
     if not stable:
-        raise SimError(f"{file}: says nothing of stability; expected the certificate of a field")
+        raise SimError(f"{file}: has no verdict on stability; expected the certificate of a field")
     for name, verdict in stable.items():
         if verdict.verdict != "certified":
             raise SimError(f"{file}: {name} is {verdict.verdict}, so no device is armed with it; {verdict.reason}")
@@ -91,6 +91,17 @@ def check_meaning(options: RunHardware) -> None:
             f"--delay {options.delay:g} has no meaning without --certificate: it is the delay that was certified; the "
             "emulated device's own is in its device file"
         )
+
+
+def ignored_options(config: RunConfig) -> list[str]:
+    """Options of a configuration that have no effect on a device: those of its simulated hand and of its figure."""
+    user, figure = config.user, config.figure
+    idle = ["user"] if user.does not in ("relaxed", "lead") else []
+    idle += [name for name in ("person", "pushes", "turns", "grabs") if getattr(user, name)]
+    idle += ["figure"] if figure.kind != "physical" else []
+    numbers = meaningless_options("kinematic", config.leads)
+    idle += [name for name in numbers if getattr(figure, name) != FIGURE_DEFAULTS[name]]
+    return [f"--{name.replace('_', '-')}" for name in idle]
 
 
 def check_limits(options: RunHardware) -> None:
@@ -128,10 +139,10 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
         If it has no motors, is not calibrated, or the calibration is of another device.
     """
     if not identity.forces:
-        raise SimError(f"{identity.name} has no motors: no force can be felt on it; it plays, it is not armed")
+        raise SimError(f"{identity.name} has no motors and gives no force: it can be played, not armed")
     if calibration is None and not identity.calibrated:
         raise SimError(
-            f"{identity.name} is not calibrated: its encoders do not know their zero; expected a --device-file that "
+            f"{identity.name} is not calibrated: its encoders have no zero; expected a --device-file that "
             "hvf hardware calibrate has written"
         )
     if calibration is not None and (reason := calibration.rejection_reason(identity)):
@@ -142,12 +153,12 @@ def check_device(identity: DeviceIdentity, calibration: Calibration | None, iden
     warnings: list[str] = []
     if not identity.watchdog:
         warnings.append(
-            f"{identity.name} has no watchdog of its own: if this machine stops, its motors keep their last torque; "
+            f"{identity.name} has no watchdog: if this machine stops, its motors keep their last torque; "
             "keep its power switch within reach"
         )
     if identity.own_weight and not identified:
         warnings.append(
-            f"{identity.name} is no Phantom by build, and the certificate is for the friction and inertia of one; find "
-            "out its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
+            f"{identity.name} is not a Phantom, and the certificate assumes a Phantom's friction and inertia; identify "
+            "its own with hvf hardware identify, and certify with that --device-file; hold it firmly until then"
         )
     return warnings

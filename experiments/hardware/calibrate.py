@@ -41,7 +41,7 @@ def calibrate(options: CalibrateHardware) -> int:
     base = read_device_file(options.out) if options.out.exists() else {}
     if "offset" in base and not options.overwrite:
         raise SimError(
-            f"{options.out}: has an offset of the encoders; choose another --out, or --overwrite that offset"
+            f"{options.out}: already has an encoder offset; choose another --out, or --overwrite that offset"
         )
     emulated_linkage = linkage_from(read_device_file(options.emulate) if options.emulate else {})
     driver = Fixture(options.pose, emulated_linkage) if options.name == EMULATED else open_device(options.name)

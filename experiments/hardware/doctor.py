@@ -97,7 +97,7 @@ def _permissions(devices: list[FoundDevice]) -> list[Finding]:
 
 def _limits() -> list[Finding]:
     if not sys.platform.startswith("linux"):
-        return [Finding("realtime", WEAK, f"{platform.system()} has no realtime class that is used here")]
+        return [Finding("realtime", WEAK, f"{platform.system()} has no supported realtime class")]
     import resource  # not on Windows
 
     unlimited = resource.RLIM_INFINITY
@@ -136,7 +136,7 @@ def _preemption() -> Finding:
     kind = next((word for word in ("PREEMPT_RT", "PREEMPT_DYNAMIC", "PREEMPT") if word in build), "no preemption")
     if kind == "PREEMPT_RT":
         return Finding("kernel", OK, kind)
-    return Finding("kernel", WEAK, kind, "a kernel with PREEMPT_RT is late by less, above all in the worst case")
+    return Finding("kernel", WEAK, kind, "a kernel with PREEMPT_RT has less latency, above all in the worst case")
 
 
 def _governor() -> Finding:

@@ -68,7 +68,7 @@ def recorded_motions(path: Path) -> list[Motion]:
     file = path / RECORDING if path.is_dir() else path
     with Recording(file) as recording:
         if not is_device_recording(recording):
-            raise SimError(f"{file}: is no recording of a hardware run; expected one of hvf hardware run")
+            raise SimError(f"{file}: is not a recording of a hardware run; expected one of hvf hardware run")
         tick, clock, theta, torque, state = (
             recording.channel("ticks", name)[:] for name in ("tick", "clock", "theta", "torque", "state")
         )
@@ -91,6 +91,6 @@ def lines_of(found: IdentificationResult, motions: Sequence[Motion]) -> list[str
     ]
     for name, value, margin in zip(NAMES, found.values, found.margins, strict=True):
         unit = _UNITS[name.rstrip("123")]
-        remark = "" if margin < abs(value) else "  (not told apart from zero)"
+        remark = "" if margin < abs(value) else "  (indistinguishable from zero)"
         lines.append(f"{name:9} {value: .4g} ± {margin:.2g} {unit}{remark}")
-    return [*lines, "offset1    does not show in motions; hvf hardware calibrate measures it."]
+    return [*lines, "offset1    cannot be found from motions; hvf hardware calibrate measures it."]

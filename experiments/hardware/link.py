@@ -65,7 +65,7 @@ class Link(NamedTuple):
 
 def in_us(seconds: float) -> str:
     """Text of a time [s] in microseconds."""
-    return "not told" if np.isnan(seconds) else f"{seconds * 1e6:.0f} µs"
+    return "unknown" if np.isnan(seconds) else f"{seconds * 1e6:.0f} µs"
 
 
 def link_now(row: Mapping[str, Array]) -> str:

@@ -48,7 +48,7 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
             status = run.poll()
             line.update(link_now(status.row))
             if not status.alive:
-                console.print("The servo has stopped; the device lets go if it has a watchdog.")
+                console.print("The servo has stopped; the motors are off if the device has a watchdog.")
                 return status
             if status.recorded is not None and not status.recorded.alive and was_recording:
                 was_recording = False
@@ -71,7 +71,7 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
 
 def _recording_ended(recorded: RecorderStatus) -> str:
     reason = f" ({os.strerror(recorded.error)})" if recorded.error else ""
-    return f"The recording has ended{reason} after {recorded.rows} ticks; what it has is kept, and the run goes on."
+    return f"The recording has ended{reason} after {recorded.rows} ticks; they are kept, and the run goes on."
 
 
 def _handle_enter(run: HardwareRun, status: RunStatus) -> bool:
@@ -106,10 +106,10 @@ def _status_line(status: RunStatus, dead_man: bool, terminal: bool) -> str:
         State.DISARMED: _DISARMED_TEXT + hint,
         State.ARMING: "Arming: no force yet"
         + (", the switch has to be held, and" if dead_man else ";")
-        + " the force that is asked for has to be small first.",
-        State.RAMPING: "The force comes in.",
-        State.ACTIVE: "Active." + (" Enter lets go." if terminal else ""),
-        State.FAULT: f"The device let go at {float(status.row['t']):.3f} s: {status.fault.words(status.value)}."
+        + " the requested force has to be small first.",
+        State.RAMPING: "The force ramps up.",
+        State.ACTIVE: "Active." + (" Enter switches the motors off." if terminal else ""),
+        State.FAULT: f"Motors switched off at {float(status.row['t']):.3f} s: {status.fault_text}."
         + (" Enter clears it, and arms again." if terminal else ""),
     }
     return f"{float(status.row['t']):8.2f} s  {texts[status.state]}"

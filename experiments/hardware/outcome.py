@@ -85,15 +85,15 @@ class Outcome:
             f"{name}: {self.active:.1f} s under force, {1e3 * self.distance:.2f} mm RMS from the curve, at most "
             f"{self.force:.2f} N and {self.heat:.0%} of the motors' heat.",
             f"The twin predicted a tick within {1e3 * self.apart:.3f} mm RMS; the hand pushed with at most "
-            f"{self.hand_force:.2f} N (estimated; errors of friction and inertia are in it).",
+            f"{self.hand_force:.2f} N (estimated; with the errors of friction and inertia).",
         ]
 
     def lines(self) -> list[str]:
         """The outcome in words, faults and failures first."""
-        errors = [f"The device let go: {self.fault}."] if self.fault else []
+        errors = [f"The motors were switched off: {self.fault}."] if self.fault else []
         if len(self.let_go) > bool(self.fault):
-            errors += [f"It let go {len(self.let_go)} times in all, and was armed again: {'; '.join(self.let_go[:3])}."]
-        errors += ["The servo's process was gone before the end; the device's watchdog let go."] if self.silent else []
+            errors += [f"The motors were switched off {len(self.let_go)} times: {'; '.join(self.let_go[:3])}."]
+        errors += ["The servo's process ended early; the watchdog switched the motors off."] if self.silent else []
         errors += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
         name = f"{self.device} ({self.transport})"
         return [
@@ -106,13 +106,13 @@ class Outcome:
 
     def _timing_text(self) -> str:
         if self.compute is None or self.lateness is None:
-            return "the servo was gone before it told how long they took and how late they were"
+            return "their durations and lateness are unknown, as the servo ended early"
         compute, late = (" / ".join(f"{1e6 * value:.0f}" for value in times) for times in (self.compute, self.lateness))
         return f"p50 / p99 / p99.9: computing {compute} µs, late by {late} µs"
 
     def _growth_text(self) -> str:
         if self.memory_growth is None:
-            return "By how much the servo grew is not known"
+            return "The servo's growth is unknown"
         return f"The servo grew by {self.memory_growth:.2f} MB and {self.descriptors} open files"
 
 
@@ -122,7 +122,7 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
     return Outcome(
         device=ready.identity.name,
         transport=ready.identity.transport,
-        fault="" if last.fault is Fault.NONE else last.fault.words(last.value),
+        fault="" if last.fault is Fault.NONE else last.fault_text,
         silent=ended is None,
         broken=ended.broken if ended else "",
         ticks=ended.ticks if ended else int(last.row["tick"]),

@@ -4,7 +4,7 @@ import contextlib
 import multiprocessing
 import socket
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,23 @@ from experiments.console.compiling import compiler
 from experiments.console.output import say
 from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
-from experiments.hardware.arming_checks import check_device, check_limits, check_meaning, verified
+from experiments.hardware.arming_checks import check_device, check_limits, check_meaning, ignored_options, verified
 from experiments.hardware.operator_terminal import attend
 from experiments.hardware.outcome import Outcome, holds_ticks, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import CONFIG, DEVICE, RECORDING, REPORT, SUMMARY, check_folder, claimed_and_cleared
+from experiments.results.folder import (
+    CONFIG,
+    DEVICE,
+    RECORDING,
+    REPORT,
+    SUMMARY,
+    check_folder,
+    check_holds,
+    clear_folder,
+    locked_folder,
+)
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
@@ -38,6 +48,8 @@ from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
+
+_NEW_RECORDING = f"{RECORDING}.new"  # name of the recording until the device is accepted
 
 
 def run_hardware(config: RunConfig, options: RunHardware) -> int:
@@ -59,14 +71,15 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     ------
     ModelError, ControllerError, SimError
         If there is no such device, an option has no meaning on it, it may not be armed with this field, or another run
-        is being written into the folder. The folder is then left unchanged, unless an earlier run is replaced and the
-        error is found only after a real device has been opened.
+        is being written into the folder. The folder is then left unchanged.
     """
     console = Console(stderr=True)
     check_meaning(options)
     check_folder(options.out, options.overwrite)
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
+    if ignored := ignored_options(config):
+        console.print(f"Ignored on a device: {', '.join(ignored)}.", highlight=False)
     config = resolved(config)
     _check_permit(config, options, console)
     content = content_of(config.device)
@@ -77,7 +90,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         delay_in_steps(scene, emulated_linkage.delay)
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
     session = _compile_session(config, options, console)
-    job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
+    job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
         served(config),
         options.name,
@@ -86,7 +99,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         calibration_from(content),
         silent=options.silence,
     )
-    with run_folder(options), contextlib.ExitStack() as stack:
+    with run_folder(options) as begin, contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             make_device = MakeEmulated(scene, start_of(session), emulated_linkage)
             packets = stack.enter_context(emulated(make_device, options.realtime))
@@ -94,8 +107,10 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
+        warnings = check_device(ready.identity, make.calibration, "inertia" in content)
+        begin()
         _write_inputs(config, content, options.out)
-        for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
+        for line in (*warnings, *ready.said):
             console.print(line, highlight=False)
         if options.view:
             stack.enter_context(_serve_page(config, run))
@@ -124,19 +139,33 @@ def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None
 
 
 @contextlib.contextmanager
-def run_folder(options: RunHardware) -> Generator[None, None, None]:
-    """Lock the folder and clear it; if no tick is recorded, all that the run wrote into it is removed."""
-    out, is_new = options.out, not options.out.exists()
-    with claimed_and_cleared(out, options.overwrite):
+def run_folder(options: RunHardware) -> Generator[Callable[[], None], None, None]:
+    """Lock the folder; the yielded function replaces an earlier run in it by the recording that has been begun.
+
+    Until then the earlier run stays; if no tick is recorded, all that the run wrote is removed.
+    """
+    out, is_new, begun = options.out, not options.out.exists(), False
+
+    def begin() -> None:
+        nonlocal begun
+        clear_folder(out)
+        begun = True
+        with contextlib.suppress(FileNotFoundError):  # the recorder could not start
+            (out / _NEW_RECORDING).rename(out / RECORDING)
+
+    with locked_folder(out):
+        check_holds(out, options.overwrite)
+        (out / _NEW_RECORDING).unlink(missing_ok=True)
         try:
-            yield
+            yield begin
         finally:
-            if not holds_ticks(out / RECORDING):
+            (out / _NEW_RECORDING).unlink(missing_ok=True)
+            if begun and not holds_ticks(out / RECORDING):
                 for name in (CONFIG, DEVICE, RECORDING):
                     (out / name).unlink(missing_ok=True)
-                with contextlib.suppress(OSError):  # other files are in it
-                    if is_new:
-                        out.rmdir()
+            with contextlib.suppress(OSError):  # other files are in it
+                if is_new:
+                    out.rmdir()
 
 
 def _gate(config: RunConfig, options: RunHardware) -> Gate:

@@ -22,7 +22,7 @@ class RunHardware:
     name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
     """A device as `hvf hardware list` names it, or "emulated": the MuJoCo linkage in a process of its own."""
     emulate: Path | None = None
-    """Device file of what the emulated device is, hidden from the servo; by default it is as --device-file says."""
+    """Device file that the emulated device obeys, hidden from the servo; by default that of --device-file."""
     certificate: Path | None = None
     """Folder or certificate.json of `hvf certify` for this very field; only the emulated device runs without."""
     delay: Annotated[float, at_least(0.0, unit="s")] = 0.0
@@ -40,19 +40,19 @@ class RunHardware:
     speed: Annotated[float, above(0.0, unit="m/s")] = 1.0
     """Speed of the tip from which on the force fades; half as much again is a fault [m/s]."""
     small: Annotated[float, above(0.0, unit="N")] = 1.0
-    """No force before the one that is asked for has been at most so small [N]."""
+    """No force before the requested one has been at most this small [N]."""
     ramp: Annotated[float, above(0.0, unit="s")] = 1.0
-    """Time in which the force is brought in [s]."""
-    late: Annotated[float, above(0.0, unit="s")] = 0.04
-    """Lateness of the servo that is a fault [s]."""
+    """Time over which the force is ramped up [s]."""
+    late: Annotated[float, above(0.0, unit="s", most=10.0)] = 0.04
+    """Lateness of the servo that counts as a fault, at most 10 [s]."""
     silence: Annotated[float, at_least(2.0, unit="periods", most=5000.0)] = 5.0
-    """Time without a new reading that is a fault; above 5, up to 5000, only of the emulated device [servo periods]."""
+    """Time without a new reading that counts as a fault; above 5, only with the emulated device [servo periods]."""
     realtime: bool = True
-    """Ask the system to run the servo before everything else."""
+    """Run the servo with realtime priority."""
     view: bool = False
     """Show device and figure in a browser, from a process of its own."""
     json: Json = False
-    """Print what the run was as JSON."""
+    """Print the outcome as JSON."""
 
 
 @part
@@ -66,11 +66,11 @@ class CalibrateHardware:
     seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
     """How long it is read, an hour at most [s]."""
     out: Path = Path("device.json")
-    """Device file to write; what an existing one says of friction, inertia and delay is kept."""
+    """Device file to write; friction, inertia and delay in an existing one are kept."""
     overwrite: bool = False
     """Replace the offset that the file has."""
     emulate: Path | None = None
-    """Device file of what the emulated device is."""
+    """Device file that the emulated device obeys."""
     json: Json = False
     """Print the file's content instead of a table."""
 
@@ -80,7 +80,7 @@ class IdentifyHardware:
     """From which recordings a device is identified, and where that is written."""
 
     runs: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders of `hvf hardware run`, or their recordings; several fast and slow ones tell more than one."""
+    """Folders of `hvf hardware run`, or their recordings; several fast and slow ones identify more than one."""
     out: Path = Path("device.json")
     """Device file to write."""
     overwrite: bool = False

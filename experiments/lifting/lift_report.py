@@ -55,7 +55,7 @@ class LiftReport(NamedTuple):
         if not after.meetings and len(names) > 1:
             lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
         lines += [
-            f"  {', '.join(names[i] for i in group)} are the same motion: one of them would do"
+            f"  {', '.join(names[i] for i in group)} are the same motion: one of them is enough"
             for group in _same_motion_groups(lifting.same)
         ]
         lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]

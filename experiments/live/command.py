@@ -88,5 +88,5 @@ def _startup_lines(host: str, port: int, out: Path, token: str | None) -> list[s
         return [f"Open http://127.0.0.1:{port} and drag the orange ball; Ctrl-C ends.", f"Takes go to {out}."]
     return [
         f"Open http://{host}:{port}/?token={token} and drag the orange ball; Ctrl-C ends.",
-        f"Takes go to {out}. The token goes over the network as it is: through one that is not yours, use ssh -L.",
+        f"Takes go to {out}. The token is sent unencrypted: on an untrusted network, use ssh -L.",
     ]

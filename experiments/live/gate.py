@@ -50,7 +50,7 @@ class Request(NamedTuple):
         first, *lines = head.decode("latin-1").rstrip("\r\n").split("\r\n")
         method, path, _ = first.split(" ")
         if method not in ("GET", "HEAD"):
-            raise ValueError(f"{method} is no way to look at a page")
+            raise ValueError(f"{method} is not allowed for a page")
         pairs = (line.split(":", 1) for line in lines)
         return Request(path, {name.strip().lower(): value.strip() for name, value in pairs})
 
@@ -67,7 +67,7 @@ def answer(request: Request, token: str | None) -> bytes | None:
     """
     host, origin = request.headers.get("host", ""), request.headers.get("origin")
     if origin is not None and urlsplit(origin).netloc != host:
-        return _response(403, "Forbidden", "This page is not to be used by another one.")
+        return _response(403, "Forbidden", "This page may not be used from another one.")
     if token is None:
         # A foreign host name that resolves to this machine (DNS rebinding) is refused.
         local = urlsplit(f"//{host}").hostname in LOCAL_HOSTS

@@ -149,7 +149,7 @@ class Page:
         add_view_buttons(gui)
         drive = gui.add_button("Drive", icon=viser.Icon.STEERING_WHEEL, hint="Several may watch, one drives.")
         self._field = gui.add_checkbox("Field arrows", True, hint="On the horizontal plane through the stylus.")
-        self._shadows = gui.add_checkbox("Shadows", shadows, hint="Without a graphics card the page is faster without.")
+        self._shadows = gui.add_checkbox("Shadows", shadows, hint="Off, the page is faster without a graphics card.")
         self.desk.look(True)
 
         @drive.on_click
@@ -227,7 +227,7 @@ class Page:
             wish = self._cap.wish(self.desk.now["p"])
         except DriverFault:
             self._cap, wish = None, None
-            self.say("The SpaceMouse is gone.")
+            self.say("The SpaceMouse was disconnected.")
         if wish is not None:
             self.desk.hold(wish[0], wish[1] or self._clock.pressed)
         elif was_holding and not self._clock.keeps:

@@ -33,7 +33,7 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
         + listed("What is not within bounds, or not certified", (*outcome.faults(), *outcome.doubts, *advice(made)))
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
-        + listed("What the file was taken for", made.report.lines() if made.report else ())
+        + listed("How the file was read", made.report.lines() if made.report else ())
     )
     style = "th, td { text-align: left; vertical-align: top; }"
     return html_page(f"{made.clip.name}, prepared", body, style)

@@ -86,7 +86,7 @@ class _Capture(NamedTuple):
         outcome = (
             "prepared"
             if rows[0, 1]
-            else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` says"
+            else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` reports"
         )
         remarks = (*notes, f"{self.path.name}: {outcome}; --raw takes the capture as it is")
         return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks, bool(rows[0, 1]))

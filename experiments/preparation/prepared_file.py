@@ -6,6 +6,7 @@ import numpy as np
 
 from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.tracking_trial import Followed
+from models.gravity import GRAVITY
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text
@@ -83,7 +84,7 @@ def summary(outcome: PreparedFile) -> str:
     faults = outcome._replace(flights=flights).faults()
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; "
-        f"contact lacks {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
+        f"contact leaves a residual of {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
         f"{made.seconds:.0f} s of processor time; "
         + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
         + "".join(f"; {line}" for line in (*outcome.doubts, *advice(made)))
@@ -111,13 +112,13 @@ def changes(made: Prepared) -> tuple[str, ...]:
     words = {
         "cycle": f"cycle {when}, whose ends were {np.rad2deg(part.gap):.1f}° apart",
         "half stride": f"half a stride, {when}, and its mirror image",
-        "way back": "the whole, and a way back",
-        "open": "the whole, at rest at both ends",
+        "way back": "the whole motion, and back",
+        "open": "the whole motion, at rest at both ends",
     }
     lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
     own_fraction = (part.end - max(part.start, 0.0)) / made.clip.duration
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
-        what = f"of {made.clip.duration:.2f} s the file's own motion is {part.end - max(part.start, 0.0):.2f} s"
+        what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
     turn, turn_at_rate = np.rad2deg(part.turns)
     if abs(turn - turn_at_rate) > _MAX_LOST_TURN:
@@ -125,18 +126,20 @@ def changes(made: Prepared) -> tuple[str, ...]:
             f"the capture turns by {turn:.0f}°, at the cycle's rate by {turn_at_rate:.0f}°: --loop open keeps its turns"
         )
     if pace.pace != 1.0:
-        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall with {pace.falls:.1f} m/s²")
+        lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall at {pace.falls:.1f} m/s²")
     elif pace.falls is not None and 0.0 < pace.falls < _MAX_SLOW_FALL:
-        lines.append(f"its flights fall with {two_digits(pace.falls)} m/s²: if they are jumps, state its --frame-rate")
-    if made.root_shift > _MIN_ROOT_SHIFT:
+        rate = made.captured.fps * float(np.sqrt(GRAVITY / pace.falls))
         lines.append(
-            f"carried over the floor by up to {100 * made.root_shift:.0f} cm, since a foot that bears the load slides"
+            f"its flights fall at {two_digits(pace.falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
+            "if they are jumps, state the --frame-rate"
         )
+    if made.root_shift > _MIN_ROOT_SHIFT:
+        lines.append(f"moved over the floor by up to {100 * made.root_shift:.0f} cm, since a loaded foot slides")
     if not made.near:
         return (*lines, "dynamics and feet as captured")
     if made.hands.seconds > 0.0:
         lines.append(
-            f"hands bear load for {made.hands.seconds:.2f} s, on places up to {100 * made.hands.moved:.0f} cm from "
+            f"hands are loaded for {made.hands.seconds:.2f} s, at points up to {100 * made.hands.moved:.0f} cm from "
             "where their palms were captured"
         )
     lines.append(
@@ -152,7 +155,7 @@ def gaps(made: Prepared) -> tuple[str, str]:
     if part.kind == "open":
         return "no loop", "no loop: at rest at both ends"
     gap = float(frame_distances(made.clip, np.array([0, last]))[0][0, 1])
-    mirror = " in a mirror" if part.kind == "half stride" else ""
+    mirror = " mirrored" if part.kind == "half stride" else ""
     was = f"ends {np.rad2deg(part.gap):.1f}° apart{mirror}" if np.isfinite(part.gap) else "as stated"
     return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
 
@@ -170,7 +173,8 @@ def advice(made: Prepared) -> tuple[str, ...]:
     return (
         f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
         f"lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
-        f"range, and still lacks {lacks}",
-        "try --loop START:END for a part without what is not feasible, --loop open if it "
-        "does not repeat, or a capture whose support is feet and hands alone",
+        f"range, and leaves a residual of {lacks}",
+        "try --loop START:END for a part without what is not feasible, "
+        + ("" if made.looped.kind == "open" else "--loop open if it does not repeat, ")
+        + "or a capture whose support is feet and hands alone",
     )

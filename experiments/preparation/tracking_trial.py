@@ -56,7 +56,7 @@ class Followed(NamedTuple):
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:
             lacks = exceeding_text(100 * self.residual, 100 * bound)
-            return (f"the physical figure lacks {lacks} % of weight; {100 * bound:.0f} at most",)
+            return (f"the physical figure has a residual of {lacks} % of weight; {100 * bound:.0f} at most",)
         return ()
 
 

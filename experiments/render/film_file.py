@@ -34,7 +34,7 @@ def check_target(target: Path, overwrite: bool) -> None:
     if target.is_dir():
         raise SimError(f"{target}: is a folder; expected a file to write")
     if target.exists() and not overwrite:
-        raise SimError(f"{target}: is there already; choose another name, or --overwrite it")
+        raise SimError(f"{target}: already exists; choose another name, or --overwrite it")
 
 
 class FilmFile:

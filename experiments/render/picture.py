@@ -37,7 +37,7 @@ def draw_picture(folder: Path, target: Path, overwrite: bool) -> None:
         machine cannot draw.
     """
     if target.suffix.lower() != ".png" or target.is_dir():
-        raise SimError(f"{target}: is no PNG file to write; expected a name that ends in .png")
+        raise SimError(f"{target}: is not a PNG file; expected a name that ends in .png")
     if target.exists() and not overwrite:
         raise SimError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
     with Recording(folder / RECORDING) as recording:

@@ -104,7 +104,7 @@ class User:
                 raise ParameterError("a person lets the stylus swing and does not turn it; leave out the turns")
             acts = [name for name in ("pushes", "grabs") if len(getattr(self, name)) > 0]
             if self.intent is not None and acts:
-                raise ParameterError(f"a person means one thing at a time; expected an intent or {acts[0]}, not both")
+                raise ParameterError(f"a person has one intent at a time; expected an intent or {acts[0]}, not both")
             does = "relaxed" if self.traces is None else "trace"
             user = RunUser(does=does, pushes=tuple(self.pushes), grabs=tuple(self.grabs))
             return participant(self.person, self.intent or intent_of(user), self.traces or curve, seconds, seed)
@@ -235,7 +235,7 @@ class Simulation:
         """Curve of the first law of the field that has one: a user-defined map lies along it."""
         curves = self.field.curves
         if not curves:
-            raise ParameterError("a map of one's own lies along the curve of the field; expected a field with a curve")
+            raise ParameterError("a user-defined map follows the curve of the field; expected a field with a curve")
         return curves[0]
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:

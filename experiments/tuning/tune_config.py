@@ -177,14 +177,14 @@ def check_tuning(config: TuneConfig) -> None:
 
 def _check_space(config: TuneConfig, where: str) -> None:
     if not config.space:
-        raise StudyError(f"{where} has an empty space; expected a word of a run with its low and high")
+        raise StudyError(f"{where} has an empty space; expected an option of a run with its low and high")
     for word, span in config.space.items():
         if not span.low < span.high or (span.log and span.low <= 0.0):
             raise StudyError(
-                f"{where}: {word} lies between {span.low:g} and {span.high:g}; expected low < high, log of > 0"
+                f"{where}: {word} is from {span.low:g} to {span.high:g}; expected low < high, and above 0 with log"
             )
         if word in ("seed", "seconds"):
-            raise StudyError(f"{where}: {word!r} is no number to tune; expected one of field, map or figure")
+            raise StudyError(f"{where}: {word!r} is not a number to tune; expected one of field, map or figure")
     # Candidates lie anywhere between the bounds, so parameters that must be whole numbers are refused here.
     config.config({word: span.low + (span.high - span.low) / math.pi for word, span in config.space.items()})
 
@@ -197,7 +197,7 @@ def _check_objectives(config: TuneConfig, where: str) -> None:
     if not config.objectives or set(config.objectives) == {MARGIN}:
         raise StudyError(f"{where} has no measure among its objectives; expected one, such as tracking_error")
     if len(set(config.objectives)) < len(config.objectives):
-        raise StudyError(f"{where}: an objective stands twice; expected {', '.join(dict.fromkeys(config.objectives))}")
+        raise StudyError(f"{where}: an objective appears twice; expected {', '.join(dict.fromkeys(config.objectives))}")
     for end in ("low", "high"):
         candidate = config.config({word: getattr(span, end) for word, span in config.space.items()})
         missing = [n for n in config.objectives if n != MARGIN and n not in measures_of(candidate.figure.kind)]

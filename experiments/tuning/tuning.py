@@ -214,8 +214,8 @@ def _sentences(
     margin = "" if tuned.stability.margin is None else f", with a margin of {tuned.stability.margin:.3g} in k_r"
     return (
         f"Chosen: {values}; its stability is {tuned.stability.verdict}{margin}.",
-        f"{counts['tried']} candidates were tried on {config.users.number} users, {counts['given up']} given up on the "
-        f"way, {counts['refused']} refused untried by the certificate.",
+        f"{counts['tried']} candidates were tried on {config.users.number} users, {counts['given up']} stopped "
+        f"early, {counts['refused']} refused untried by the certificate.",
         *(_sentence(config, comparison) for comparison in comparisons),
     )
 

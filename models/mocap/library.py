@@ -114,8 +114,8 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
         roles = roles_of(motion.joints, motion.parents)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
-        expected = "the skeleton of a human, or --roles FILE that says which joint is which"
-        raise MotionFileError(path, 1, f"no joint is taken for the {roles} (among {names})", expected)
+        expected = "the skeleton of a human, or --roles FILE that assigns its joints"
+        raise MotionFileError(path, 1, f"no joint was found for the {roles} (among {names})", expected)
     clip, report = retarget(motion, roles, hints)
     copies = [joint for own in people if len(own) > 1 for joint in own] if hints.roles is None else []
     remarks = (
@@ -132,7 +132,7 @@ def _check_single_person(motion: SourceMotion, people: Sequence[Sequence[int]]) 
     if len(people) < 2:
         return
     hips = [motion.joints[copies[0]] for copies in people]
-    expected = f'one, or --roles FILE whose line pelvis = "{hips[-1]}" says whose motion is taken'
+    expected = f'one, or --roles FILE whose line pelvis = "{hips[-1]}" selects the person'
     if len(set(hips)) < len(hips):
         expected = "one, or joints of other names for each, so that --roles can tell them apart"
     raise MotionFileError(motion.path, 1, f"there are {len(people)} people, with the hips {', '.join(hips)}", expected)
@@ -191,7 +191,7 @@ def writing(target: Path) -> Generator[None]:
         yield
     except OSError as error:
         raise ModelError(
-            f"cannot write {error.filename or target}: {error.strerror}; expected a place that can be written"
+            f"cannot write {error.filename or target}: {error.strerror}; expected a writable path"
         ) from None
 
 

@@ -34,7 +34,7 @@ class DriverFault(SimError):
 
     def __init__(self, fault: Fault, value: float = 0.0, detail: str = ""):
         super().__init__(f"{fault.words(value)} ({detail})" if detail else fault.words(value))
-        self.fault, self.value = fault, value
+        self.fault, self.value, self.detail = fault, value, detail
 
 
 class DeviceIdentity(NamedTuple):

@@ -175,7 +175,7 @@ def _explain_open_failure(path: str) -> Generator[None, None, None]:
     except OSError:
         if os.path.exists(path) and not os.access(path, os.R_OK | os.W_OK):
             raise SimError(f"no permission to open {path}; `hvf hardware doctor` prints the udev rule") from None
-        raise SimError(f"{path} cannot be opened: it is gone, or another program has it") from None
+        raise SimError(f"{path} cannot be opened: it was unplugged, or another program uses it") from None
 
 
 def open_device(name: str) -> Driver:

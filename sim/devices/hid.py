@@ -101,7 +101,7 @@ class HidPhantom:
         identity = self._read_feature(protocol.IDENTITY)
         if int(identity["magic"]) != protocol.MAGIC:
             raise SimError(
-                f"{self._transport} answers with the mark {int(identity['magic']):#x}; expected {protocol.MAGIC:#x}"
+                f"{self._transport} answers with the magic {int(identity['magic']):#x}; expected {protocol.MAGIC:#x}"
             )
         if int(identity["major"]) != protocol.VERSION[0]:
             raise DriverFault(Fault.VERSION_WRONG, int(identity["major"]))

@@ -112,7 +112,7 @@ class TipDriver:
         )  # fmt: skip
         self.telemetry = make_telemetry()
         self._reading, self._force = np.zeros(READING_SIZE), np.zeros(3)
-        self._printed: set[str] = set()
+        self._printed = list[str]()
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; `timeout` is unused.
@@ -174,9 +174,10 @@ class TipDriver:
         except Exception as error:
             words = _error_words(error)
             if words not in self._printed:
-                self._printed.add(words)
+                self._printed.append(words)
                 print(f"\n{words}", file=sys.stderr, flush=True)
-            raise DriverFault(Fault.UNPLUGGED if isinstance(error, OSError) else Fault.DEVICE_REPORTED) from None
+            fault = Fault.UNPLUGGED if isinstance(error, OSError) else Fault.DEVICE_REPORTED
+            raise DriverFault(fault, self._printed.index(words) + 1.0, words) from None
 
 
 def _error_words(error: BaseException) -> str:

@@ -32,6 +32,7 @@ from sim.hardware.recorder_process import (
     record_rows,
 )
 from sim.hardware.servo_process import (
+    DETAIL_SIZE,
     ORDER_BEAT,
     ORDER_NUMBER,
     ORDER_REQUEST,
@@ -93,6 +94,8 @@ class RunStatus(NamedTuple):
         The last tick, by `sim.hardware.gated_servo.CHANNELS`.
     recorded : RecorderStatus, optional
         Status of the recorder; None if nothing is recorded.
+    detail : str
+        The device's own message on the fault; empty if there is none.
     """
 
     alive: bool
@@ -101,6 +104,12 @@ class RunStatus(NamedTuple):
     value: float
     row: dict[str, Array]
     recorded: RecorderStatus | None
+    detail: str = ""
+
+    @property
+    def fault_text(self) -> str:
+        """The fault in words, with the device's message."""
+        return self.fault.words(self.value) + (f" ({self.detail})" if self.detail else "")
 
 
 class HardwareRun:
@@ -138,7 +147,8 @@ class HardwareRun:
         self._stop_recording, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
         self._reports, report_sender = context.Pipe(duplex=False)
         self._order, self._row, self._last_tick = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
-        channels = Channels(self._orders, self.status, self._rows, report_sender)
+        self._detail = SharedNumbers(DETAIL_SIZE)
+        channels = Channels(self._orders, self.status, self._rows, self._detail, report_sender)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
         self.recorder: BaseProcess | None = None
         if job is not None:
@@ -152,7 +162,9 @@ class HardwareRun:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        for shared in (self._orders, self.status, self._rows, self._stop_recording, self.recorder_status):
+        for shared in (
+            self._orders, self.status, self._rows, self._detail, self._stop_recording, self.recorder_status
+        ):  # fmt: skip
             shared.close()
 
     def start(self) -> Ready:
@@ -204,7 +216,10 @@ class HardwareRun:
             self._last_tick = tick, now
         alive = self.servo.is_alive() and now - self._last_tick[1] < SERVO_TIMEOUT
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
-        return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._read_recorder_status())
+        codes = np.zeros(DETAIL_SIZE)
+        self._detail.read(codes)
+        detail = "".join(map(chr, codes.astype(int))).rstrip("\0")
+        return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._read_recorder_status(), detail)
 
     def _read_recorder_status(self) -> RecorderStatus | None:
         if self.recorder is None:

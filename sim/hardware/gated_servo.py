@@ -82,6 +82,8 @@ class Ticker:
     ----------
     row : Array
         Row of the last tick, by `CHANNELS`, shape (`ROW_SIZE`,).
+    detail : str
+        The device's own message on the latched fault; empty if there is none.
 
     Raises
     ------
@@ -97,6 +99,7 @@ class Ticker:
         self._ticks, frames = make_logs(parts.servo, 1)
         field = parts.servo.field
         # All that a tick needs is in preallocated arrays, reached by views made here, so a tick allocates nothing.
+        self.detail = ""
         self._timeout, self.row = READ_SHARE * parts.gate.period, np.zeros(ROW_SIZE)
         self._tick_number, self._request = np.zeros(1), np.zeros(1)
         self._theta = self._device.reading[READING_THETA : READING_THETA + 3]
@@ -143,6 +146,11 @@ class Ticker:
         """Latch a fault, which takes effect from the next tick on."""
         latch(self._device.faults, int(fault), float(self._device.hand[HAND_TIME]), value)
 
+    def _fail_by(self, error: DriverFault) -> None:
+        if self._faults[FAULT_CODE] == 0.0:
+            self.detail = error.detail
+        self.fail(error.fault, error.value)
+
     def tick(self, number: float, request: int = NO_REQUEST) -> None:
         """Read, compute and write for tick `number`, a whole number; its time is ``number T``.
 
@@ -154,9 +162,10 @@ class Ticker:
             if parts.driver.read(device.reading, self._timeout):
                 np.subtract(self._theta, parts.offset, out=self._theta)
         except DriverFault as error:
-            self.fail(error.fault, error.value)
+            self._fail_by(error)
         if request == CLEAR:
             rearm_servo(parts.servo)
+            self.detail = ""
         self._tick_number[0], self._request[0] = number, request
         self._run_block()
         self._run_gate()
@@ -164,7 +173,7 @@ class Ticker:
         try:
             parts.driver.write(self.gated.torque, motors_on)
         except DriverFault as error:
-            self.fail(error.fault, error.value)
+            self._fail_by(error)
         if not motors_on and self._faults[FAULT_CODE] != 0.0:
             parts.driver.let_go()
         self._gather_row()

@@ -39,6 +39,9 @@ ORDER_BEAT, ORDER_NUMBER, ORDER_REQUEST, ORDER_STOP, ORDER_SIZE = 0, 1, 2, 3, 4
 """Places in an order to the servo: the heartbeat, a number that changes; number of the request; the request; 1 to end
 the servo."""
 
+DETAIL_SIZE = 300
+"""Largest length of a device's message on a fault [characters]."""
+
 _getppid = types.ExternalFunction("getppid", types.int32())
 
 
@@ -113,11 +116,12 @@ class Ended(NamedTuple):
 
 
 class Channels(NamedTuple):
-    """Connections of the servo's process. In: orders. Out: the last row, a ring of rows, and reports."""
+    """Connections of the servo's process. In: orders. Out: the last row, a ring of rows, fault message, reports."""
 
     orders: SharedNumbers
     status: SharedNumbers
     rows: Ring
+    detail: SharedNumbers
     reports: Connection
 
 
@@ -207,6 +211,7 @@ class ServoProcess:
         self._read_orders = BoundCall(read_orders, (orders.count, orders.numbers, orders.whole, order, parent))
         self._rows, shown = rows.numbers, (status.count, status.numbers, rows.count, rows.numbers)
         self._publish_row = BoundCall(publish_row, (ticker.row, *shown, self._compute, self._lateness))
+        self._shown_detail, self._detail = channels.detail, ticker.detail
         self._ticks = self._missed = 0.0
         self._last_beat_time, self._last_beat, self._last_request = time.monotonic(), -1.0, 0.0
         self._initial_resources = _resource_use()
@@ -215,7 +220,7 @@ class ServoProcess:
         """Compile and warm up with the motors off, then request real-time scheduling and report `Ready`."""
         for _ in range(3):
             self._ticker.tick(0)
-        report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as it was asked to."]
+        report = become_realtime() if self._clock.realtime else ["The servo runs like any process, as requested."]
         self._ticker.tick(0)
         self._rows.sum()  # touch all pages of the ring now, to avoid page faults later
         self._ticker.parts.driver.telemetry[[LOST, REFUSED]] = 0.0  # losses before the start do not count
@@ -252,12 +257,17 @@ class ServoProcess:
         ticker.tick(number, int(order[ORDER_REQUEST]) if is_new_request else NO_REQUEST)
         ticker.note_time(self._missed, late, time.monotonic() - now)
         self._publish_row()
+        if ticker.detail != self._detail:  # only when a fault comes or goes
+            self._detail = ticker.detail
+            self._shown_detail.write(
+                np.array([ord(c) for c in self._detail[:DETAIL_SIZE].ljust(DETAIL_SIZE, "\0")], float)
+            )
         self._ticks += 1.0
         return True
 
     def close(self) -> None:
         """Drop all views of the shared memory, so that it can be closed."""
-        del self._read_orders, self._publish_row, self._rows
+        del self._read_orders, self._publish_row, self._rows, self._shown_detail
 
     def ended(self, broken: str) -> Ended:
         """The final report."""

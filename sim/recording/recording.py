@@ -57,7 +57,7 @@ def _open_file(path: Path) -> h5py.File:
     """Open the file: in SWMR mode while its writer lives, else as the writer left it (`sim.recording.unclosed`)."""
     head = superblock(path)
     if head is None:
-        raise OSError("no HDF5 file of this program")
+        raise OSError("not an HDF5 file of this program")
     if not head.sound:
         raise OSError("its first bytes are damaged")
     if head.being_written and has_writer(path):

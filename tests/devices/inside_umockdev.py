@@ -174,7 +174,7 @@ def test_doctor_measures_link_with_motors_off(phantom, capsys) -> None:
     assert "link     Reference HVF-0001 (/dev/hidraw0)" in output
     assert "0 lost, 0 refused" in output
     assert "round trip" in output
-    assert "not told" not in output
+    assert "unknown" not in output
     assert not phantom.firmware.motors.on
 
 

@@ -98,8 +98,9 @@ def test_exception_or_invalid_pose_is_a_fault_without_reading(pose, fault) -> No
 def test_exception_is_printed_once(capsys) -> None:
     driver = TipDriver(Scripted(ValueError("a bad cable")), "here")
     for _ in range(3):
-        with pytest.raises(DriverFault):
+        with pytest.raises(DriverFault) as refused:
             driver.read(np.zeros(9), 0.0)
+        assert refused.value.detail.endswith("ValueError: a bad cable")
     assert capsys.readouterr().err.strip().count("ValueError: a bad cable") == 1
 
 

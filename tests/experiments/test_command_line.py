@@ -189,7 +189,7 @@ def test_interrupt_during_imports_is_one_line() -> None:
     code = "import os, signal, experiments.console.startup\n"
     code += "try: os.kill(os.getpid(), signal.SIGINT)\nexcept BaseException: raise ImportError('initialization failed')"
     completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
-    assert completed.stderr == "hvf: stopped; nothing is left half done\n"
+    assert completed.stderr == "hvf: stopped; no partial files are left\n"
     assert completed.returncode == 130
 
 
@@ -209,15 +209,16 @@ def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_p
     assert not list(tmp_path.iterdir())
 
 
-def test_missing_library_for_mujoco_gl_is_named_and_skipped() -> None:
+@pytest.mark.parametrize("first", ["from experiments.cli import main; main(['clips'])", "import hvf"])
+def test_missing_library_for_mujoco_gl_is_named_and_skipped(first: str) -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
-    code += "from experiments.cli import main; main(['clips']); import os; print(os.environ.get('MUJOCO_GL'))"
+    code += f"{first}; import os; print(os.environ.get('MUJOCO_GL'))"
     completed = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | {"MUJOCO_GL": "osmesa"}, capture_output=True, text=True,
         check=True, timeout=60,
     )  # fmt: skip
     assert completed.stderr.splitlines()[0] == (
-        "MUJOCO_GL is 'osmesa', and libOSMesa is not on this machine: left out; unset it, or apt-get install libosmesa6"
+        "MUJOCO_GL is 'osmesa', and libOSMesa is not on this machine: ignored; unset it, or apt-get install libosmesa6"
     )
     assert completed.stdout.endswith("None\n")
 

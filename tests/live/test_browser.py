@@ -122,7 +122,7 @@ def test_spacemouse_moves_the_hand_while_pushed(tab: Any, served: ServedPage) ->
     served.assert_until(lambda: not desk.holds, "it is let go")
     cap.plugged = False
     served.assert_until(lambda: served.page._cap is None, "it is gone")
-    tab.get_by_text("The SpaceMouse is gone.").wait_for()
+    tab.get_by_text("The SpaceMouse was disconnected.").wait_for()
 
 
 def test_gain_moved_beyond_stability_turns_its_verdict_red(tab: Any, served: ServedPage) -> None:

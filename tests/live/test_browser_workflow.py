@@ -243,7 +243,7 @@ def test_run_continues_from_the_displayed_past(tab: Any, served: ServedPage) -> 
     fill(tab, "Look back [s]", "-2")
     served.assert_until(lambda: served.page._clock.seconds_ago == 2.0, "one looks back")
     before = float(served.settled()["t"][0])
-    button(tab, "Go on from there").click()
+    button(tab, "Resume from there").click()
     served.assert_until(lambda: float(desk.now["t"][0]) < before - 1.5, "time is earlier")
     served.assert_until(lambda: not desk.paused and served.page._clock.seconds_ago == 0.0, "and goes on")
 

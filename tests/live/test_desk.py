@@ -127,7 +127,7 @@ def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path
     with pytest.raises(SimError, match="no motion file"):
         desk.upload("picture.png", b"")
     desk.upload("../../broken.bvh", b"HIERARCHY\nROOT nobody\n{ oh }\n")
-    with pytest.raises(SimError, match="one file after the other"):
+    with pytest.raises(SimError, match="one file at a time"):
         desk.upload("second.bvh", b"")
     desk.until(lambda: desk.preparing is None, "the broken one is answered")
     assert desk.said[-1].startswith("broken.bvh")

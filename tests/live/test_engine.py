@@ -236,14 +236,15 @@ def test_too_short_take_is_refused(tmp_path):
     engine = make_engine()
     take = Take(tmp_path / "take", engine)
     take.add(engine.advance(), engine)
-    with pytest.raises(SimError, match=r"0\.01 s is not measured"):
+    with pytest.raises(SimError, match=r"a take of 0\.01 s is not kept"):
         take.end(engine)
+    assert not (tmp_path / "take").exists()
 
 
 def test_take_during_pause_leaves_no_folder(tmp_path):
     engine = make_engine()
     take = Take(tmp_path / "take", engine)
-    with pytest.raises(SimError, match="time stood still"):
+    with pytest.raises(SimError, match="time was paused"):
         take.end(engine)
     assert not (tmp_path / "take").exists()
 

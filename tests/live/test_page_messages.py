@@ -27,9 +27,9 @@ def page() -> Any:
 
 def test_repeated_message_is_shown_once_and_last() -> None:
     shown = page()
-    for line in ("Nothing is left to undo.", "another", "Nothing is left to undo."):
+    for line in ("Nothing to undo.", "another", "Nothing to undo."):
         shown.say(line)
-    assert shown._messages == ["another", "Nothing is left to undo."]
+    assert shown._messages == ["another", "Nothing to undo."]
     assert shown._lines.content.count("Nothing") == 1
 
 

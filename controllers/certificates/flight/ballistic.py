@@ -118,9 +118,9 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
     verdict: Outcome = "refuted"
     if likely < low and fit.clearance < tolerance.clearance:
         verdict = "unknown"
-        why = f"{falls} and rises only {100 * fit.clearance:.0f} cm: it may stand on a floor that the recording misses"
+        why = f"{falls} and rises only {100 * fit.clearance:.0f} cm: it may stand on a floor not in the recording"
     elif not low <= likely <= high:
-        explanation = "; something bears it that the recording misses, such as a box, or the frame rate is wrong"
+        explanation = "; it stands on something not in the recording, such as a box, or the frame rate is wrong"
         if fit.gravity > _MIN_GRAVITY_RATIO * GRAVITY:
             explanation = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g"
         why = f"{falls}, not within {low:g} to {high:g}{explanation}"

@@ -67,7 +67,7 @@ def contact_doubts(
     unheld = _longest_run(touched.supported & ~touched.held) / fps
     figures |= {"unheld": unheld, "skate": touched.skate}
     if unheld > tolerance.unheld:
-        doubts.append(f"for {unheld:.2f} s it is low and nothing of it is at rest, longer than {tolerance.unheld:g}")
+        doubts.append(f"for {unheld:.2f} s it is near the floor with no part at rest, longer than {tolerance.unheld:g}")
     if touched.skate > tolerance.skate:
         doubts.append(f"a foot that stands skates by {100 * touched.skate:.2f} cm, more than {100 * tolerance.skate:g}")
     return doubts + _jump_doubts(touched, com, fps, tolerance, figures), figures

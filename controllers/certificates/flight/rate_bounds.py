@@ -138,7 +138,7 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     frame = int(np.argmin(high[:frames]))
     rate = float(high[frame])
     assumptions = (
-        f"coefficient of friction {friction:g}, the floor pushes and does not pull",
+        f"coefficient of friction {friction:g}, the floor cannot pull",
         f"accelerations are those of the centre of mass, averaged over {_WINDOW:g} s",
     )
     if not np.isfinite(rate):
@@ -146,7 +146,7 @@ def turns_verdict(motion: BodyMotion, flights: Sequence[FlightJudgement], fricti
     # Enough decimals to tell a rate below 1 from 1.
     digits = next((k for k in range(2, 16) if round(rate, k) < 1.0), 2)
     up_to = f"up to {rate:.{digits}f} of" if rate < ANY_RATE else f"more than {ANY_RATE:g} times"
-    reason = f"the floor gives it {up_to} its speed; the hardest is at {frame / motion.fps:.2f} s"
+    reason = f"friction permits {up_to} its speed; the critical frame is at {frame / motion.fps:.2f} s"
     if rate >= 1.0:
         return Verdict("certified", reason, rate**2 - 1.0 if rate < ANY_RATE else None, assumptions)
     counterexample = {"frame": frame, "rate": rate, **_window_counterexample(motion, frame, friction)}

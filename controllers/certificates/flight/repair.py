@@ -175,7 +175,7 @@ def repair(task: RepairTask) -> RepairPlan:
     except RuntimeError:
         raise RepairError(
             f"no feasible neighbour of {len(task.flights)} flights in {n} frames was found "
-            f"({opti.return_status()}); expected flights that timing and height can mend"
+            f"({opti.return_status()}); expected flights that timing and height can repair"
         ) from None
     return RepairPlan(
         times=np.concatenate([[0.0], np.cumsum(np.asarray(solution.value(steps)).ravel())]),

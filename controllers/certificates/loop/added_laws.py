@@ -43,7 +43,7 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
     if not added:
         return [river]
     if river.k_r <= 0.0:
-        raise ControllerError("a certificate of laws of one's own needs a stiffness k_r above zero beside them")
+        raise ControllerError("a certificate of user-defined laws needs a stiffness k_r above zero beside them")
     phases = river.phases(REFERENCES)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     # At rest on the curve, and at the curve's speed: the states about which the loop is linearised.
@@ -53,7 +53,7 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
         cases.check_slopes(references)
     hulls = [slopes_of(cases, references) for cases in switched]
     if np.prod([len(hull) for hull in hulls]) > MAX_CASES:
-        raise ControllerError(f"the laws of one's own have more than {MAX_CASES} cases together")
+        raise ControllerError(f"the user-defined laws have more than {MAX_CASES} cases together")
     combined = [sum(slopes, np.zeros((3, 6))) for slopes in itertools.product(*hulls)]
     return [river._replace(law=_law_with_added(river, smooth, switched, slope)) for slope in combined]
 

@@ -94,6 +94,6 @@ def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]
         return Verdict("refuted", refutation, largest / drag - 1.0, assumptions, example, figures)
     margin = min(alone.margin or 0.0, largest / drag - 1.0)
     if alone.verdict == "certified" and largest <= drag:
-        reason = f"stable while the governor acts and while it rests, but not certain as it comes and goes: {summary}"
+        reason = f"stable while the governor acts and while it rests, but not certified as it switches: {summary}"
         return Verdict("unknown", f"{reason}; {alone.reason}", margin, assumptions, {}, figures)
     return Verdict(alone.verdict, f"{alone.reason}; {summary}", margin, assumptions, {}, figures)

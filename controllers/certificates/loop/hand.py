@@ -57,7 +57,7 @@ NO_HAND = HandImpedance()
 
 @dataclass(frozen=True)
 class HandRange:
-    """Intervals of the impedance of the hands that may hold the stylus.
+    """Impedance intervals of the hands that may hold the stylus.
 
     Parameters
     ----------
@@ -87,7 +87,9 @@ class HandRange:
         for name in ("mass", "damping", "stiffness"):
             low, high = getattr(self, name)
             if low > high:
-                raise ParameterError(f"{name} of hands lies between {low} and {high}: the smaller number comes first")
+                raise ParameterError(
+                    f"{name} of hands lies between {low} and {high}; expected the smaller number first"
+                )
         corners = [HandImpedance(*c) for c in itertools.product(self.mass, self.damping, self.stiffness)]
         middle = HandImpedance(*(0.5 * (low + high) for low, high in (self.mass, self.damping, self.stiffness)))
         return list(dict.fromkeys([NO_HAND, *corners, middle]))

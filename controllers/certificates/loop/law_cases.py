@@ -135,7 +135,7 @@ def cases_of(law: FunctionLaw) -> Cases:
         found.append(Case(vector(wrench[:3]), vector(wrench[3:]), tuple(path.conditions)))
     _check_inputs(law, found, symbols)
     if any(_is_nonsmooth(case, casadi.vertcat(*symbols.values())) for case in found):
-        raise ControllerError(f"the force of {law.place} bends where nothing is compared, as √x² does; expected abs(x)")
+        raise ControllerError(f"the force of {law.place} has a kink without a comparison, as √x²; expected abs(x)")
     return Cases(law, symbols["p"], symbols["v"], tuple(found))
 
 
@@ -158,7 +158,7 @@ def _wrench_on_path(law: FunctionLaw, path: ExecutionPath, symbols: dict[str, Sy
         why = path.lost or (None if len(wrench) in (3, 6) else f"it gives {len(wrench)} numbers; expected three or six")
         if why is None:
             return wrench + [casadi.SX(0.0)] * (6 - len(wrench))
-    raise ControllerError(f"{law.place} cannot be followed on symbols: {why}")
+    raise ControllerError(f"{law.place} cannot be evaluated symbolically: {why}")
 
 
 def _is_nonsmooth(case: Case, x: Symbol) -> bool:
@@ -175,7 +175,7 @@ def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol
     found = [told for name, told in names.items() if casadi.depends_on(read, symbols[name])]
     if found:
         raise ControllerError(
-            f"the force of {law.place} depends on {' and '.join(found)} of the hand; a certificate is of forces that "
+            f"the force of {law.place} depends on {' and '.join(found)} of the hand; a certificate covers forces that "
             "depend on its position and velocity alone"
         )
 
@@ -199,7 +199,7 @@ def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Ar
             evaluate(*program.compiled(), memory, hand.vector(), wrench)
         except NotExecutable:
             raise NotExecutable(
-                f"{law.place} keeps numbers of the hand between calls; a certificate is of a function of the hand alone"
+                f"{law.place} keeps numbers of the hand between calls; a certificate covers functions of it alone"
             ) from None
         except ParameterError:
             raise
@@ -229,11 +229,11 @@ def certified_cases(law: FunctionLaw, curve: Trajectory) -> Cases:
         difference = np.linalg.norm(other - force, axis=1)
         return np.isnan(difference) | (difference > size)
 
-    _refuse_if(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when it is asked again")
+    _refuse_if(law, curve, differs(executed(law, curve, backwards=True)[:, :3]), "another force when called again")
     cases, hands = cases_of(law), sample_hands(curve)
     places, velocities = (np.array([getattr(hand, name) for hand in hands]).T for name in ("p", "v"))
     symbolic = np.array(cases.chosen.map(len(hands))(places, velocities)[0]).T
-    _refuse_if(law, curve, differs(symbolic), "another force in a run than on symbols")
+    _refuse_if(law, curve, differs(symbolic), "another force in a run than symbolically")
     return cases
 
 
@@ -241,6 +241,6 @@ def _refuse_if(law: FunctionLaw, curve: Trajectory, wrong: Mask, what: str) -> N
     if wrong.any():
         hand = sample_hands(curve)[int(np.argmax(wrong))]
         raise ControllerError(
-            f"{law.place} gives {what}, as for a hand at {state_text(hand.p, hand.v)}; a certificate is of a "
-            "function of the hand alone"
+            f"{law.place} gives {what}, as for a hand at {state_text(hand.p, hand.v)}; a certificate covers "
+            "functions of the hand alone"
         )

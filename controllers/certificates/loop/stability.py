@@ -100,9 +100,13 @@ def critical_damping(loop: SampledLoop, k_r: float, least: float) -> Array:
 
 def _smallest_unstable(radius: Callable[[float | Array], Array], least: float, most: float) -> Array:
     """First gain between `least` and `most` with a spectral radius of 1 at each phase: a grid, then 24 bisections."""
-    grid = np.geomspace(least, most, GAIN_GRID)
-    low, high = _bracket_onset(np.array([radius(gain) < 1.0 for gain in grid]), grid)
-    for _ in range(24):
+    grid, rows = np.geomspace(least, most, GAIN_GRID), list[Mask]()
+    for gain in grid:
+        rows.append(radius(gain) < 1.0)
+        if not np.all(rows, axis=0).any():  # every phase has its first unstable gain
+            break
+    low, high = _bracket_onset(np.array(rows), grid[: len(rows)])
+    for _ in range(24 if (low < np.minimum(high, most)).any() else 0):
         middle = np.sqrt(low * np.minimum(high, most))
         stable = radius(middle) < 1.0
         low, high = np.where(stable, middle, low), np.where(stable, high, middle)
@@ -209,7 +213,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     margin = min(least, MAX_STIFFNESS) / own - 1.0
     figures = _figures(river, found)
     assumptions = (
-        "linear: small deviations, no Coulomb friction, no rounding; a force that the limiter cuts is taken for one of "
+        "linear: small deviations, no Coulomb friction, no rounding; a force cut by the limiter is treated as one of "
         f"lower gains, down to {LIMITER_FACTORS[0]:.0%} of them, and its slew is not reached",
         f"phases: {found.critical.shape[1]} of the curve; hands: {len(hands)} of their intervals (corners and middle)",
         "the device as modelled: rigid links, ideal torque sources",
@@ -296,4 +300,8 @@ def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Ar
 def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
     """Stability boundary: critical k_r [N/m], the smallest over the phases, for each b_d in `damping` [N s/m]."""
     loop = SampledLoop(river.still(hand), river.sampling)
-    return np.array([critical_stiffness(loop, float(b_d)).min() for b_d in damping])
+
+    def critical(b_d: float) -> float:
+        return float(_smallest_unstable(lambda k_r: loop.radius(k_r, b_d).max(keepdims=True), 1.0, MAX_STIFFNESS)[0])
+
+    return np.array([critical(float(b_d)) for b_d in damping])

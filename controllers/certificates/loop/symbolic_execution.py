@@ -94,7 +94,7 @@ class ExecutionPath:
 
 
 _CONVERSION_MESSAGE = (
-    "it makes a plain number of one of the hand's, as float(), the functions of math and an array of floats do; "
+    "it converts a number of the hand to a plain one, as float(), the functions of math and an array of floats do; "
     "expected functions of NumPy, as np.sqrt, np.hypot, np.linalg.norm(hand.p), and np.array([...]) of such numbers"
 )
 

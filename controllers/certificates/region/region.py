@@ -44,7 +44,7 @@ REDUCED_RATES = (0.97, 0.93, 0.85)
 
 
 class CertifiedRegion(NamedTuple):
-    """A checked form, its level ℓ, the level of the ball that is reached, and the remainder at ℓ."""
+    """A checked form, its level ℓ, the level of the ball reached, and the remainder at ℓ."""
 
     form: Form
     checked: Checked
@@ -75,7 +75,7 @@ def _force_term(form: Form, rest: Remainder) -> float:
 def _find_levels(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, limits: Limits
 ) -> tuple[float, float]:
-    """Largest invariant level ℓ, and the level of the ball that is reached; zeros if there is none."""
+    """Largest invariant level ℓ, and the level of the ball reached; zeros if there is none."""
     grid = np.arange(LEVELS + 1) / LEVELS
     invariant, decreases = [False], [False]
     for i in range(1, LEVELS + 1):
@@ -250,7 +250,7 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
 def _description(axis: Axis, found: CertifiedRegion) -> str:
     offset, speed = found.offsets(axis)
     return (
-        f"from {1e3 * offset:.3g} mm off the curve, or {speed:.3g} m/s from its pace, the hand comes within "
+        f"from {1e3 * offset:.3g} mm off the curve, or {speed:.3g} m/s off its speed, the hand comes within "
         f"{1e3 * found.rest.distance * found.ball:.3g} mm and stays there"
     )
 
@@ -268,9 +268,9 @@ def _reason(frozen: CertifiedRegion | None, hands: HandRange) -> str:
     if frozen is None:
         return f"no Lyapunov function was found for {_hands_text(hands)} alone"
     return (
-        f"with {_hands_text(hands)} alone V falls at {frozen.form.rate:.3g}/s with the inertia frozen, but half way in "
-        f"what that leaves out may take {frozen.rest.rate:.3g}/s, push by {frozen.rest.drift:.3g}/s, and with "
-        f"{frozen.rest.newtons:.2g} N hold it at {frozen.held_up:.2g} of its edge: too much to be certain"
+        f"with {_hands_text(hands)} alone V decays at {frozen.form.rate:.3g}/s with frozen inertia, but half way in "
+        f"the neglected terms may reduce that by {frozen.rest.rate:.3g}/s and add {frozen.rest.drift:.3g}/s, and "
+        f"{frozen.rest.newtons:.2g} N hold it at {frozen.held_up:.2g} of its edge: no region is certified"
     )
 
 

@@ -292,9 +292,9 @@ def switching(
         summary = f"|U| ≤ {push:g} N never changes the river (up to {allowed:.3g} N): the dwell time is infinite"
         return Verdict("certified", summary, allowed - push, assumptions, {}, figures)
     summary = (
-        f"the bounds let a hand go that pushes with {push:g} N, and a search found none that is lost"
+        f"by the bounds a push of {push:g} N may lose the hand, but a search found no hand that is lost"
         if sharing.form == "discrete"
         else "smooth weights have no hysteresis and so no dwell time, and a search found no hand that is lost"
     )
-    summary += f"; a rival weighs up to {figures['rival_weight']:.2g}"
+    summary += f"; another river's weight reaches {figures['rival_weight']:.2g}"
     return Verdict("unknown", summary, None, assumptions, {}, figures)

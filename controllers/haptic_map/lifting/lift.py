@@ -117,7 +117,7 @@ def _check_motion(motion: Motion) -> None:
     gap = closing_gap(motion.poses) if motion.closed else 0.0
     if gap > CLOSES:
         raise ParameterError(
-            f"clip {motion.name!r} is said to be cyclic, but its last frame is {gap:.2g} (m, or half radians) from its "
+            f"clip {motion.name!r} is given as cyclic, but its last frame is {gap:.2g} (m, or half radians) from its "
             "first one moved over the ground; lift it as an open clip, or cut it where it repeats"
         )
 

@@ -29,9 +29,9 @@ class ClockPanel:
         self._desk = desk
         self._grab = gui.add_checkbox(
             "Grab and bend", False, visible=False,
-            hint="The stylus' switch: with it a drag takes hold of the curve and bends it; so does shift.",
+            hint="The stylus's switch: with it, or with shift, dragging grabs the curve and bends it.",
         )  # fmt: skip
-        self._hold_on = gui.add_checkbox("Hold on", False, hint="Keep the stylus when the mouse lets go of the ball.")
+        self._hold_on = gui.add_checkbox("Hold on", False, hint="Hold the stylus when the mouse releases the ball.")
         self._perform = gui.add_button("Perform the bent curve", visible=False, icon=viser.Icon.PLAYER_PLAY)
         self._time = gui.add_button_group("Time", ("Pause", "Step", "Reset"))
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
@@ -42,10 +42,10 @@ class ClockPanel:
             0.0,
             0.1,
             0.0,
-            hint="Now is at the right; time stands still while you look.",
+            hint="The present is at the right; time is paused while you look back.",
         )
-        self._resume = gui.add_button("Go on from there", visible=False)
-        self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
+        self._resume = gui.add_button("Resume from there", visible=False)
+        self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force ramps up from zero.")
         self._grab.on_update(acts(lambda event: desk.press(self._grab.value)))
         self._hold_on.on_update(acts(lambda event: None if self._hold_on.value else desk.let_go()))
         self._perform.on_click(acts(lambda event: desk.perform(not self._is_performing)))
@@ -56,7 +56,7 @@ class ClockPanel:
         self._resume.on_click(acts(lambda event: self._go_on_from_past()))
         self._rearm.on_click(acts(lambda event: desk.rearm()))
         keys: dict[str, tuple[Any, Callable[[Any], None]]] = {
-            "Pause or go on": ("space", lambda event: desk.pause(not desk.paused)),
+            "Pause or resume": ("space", lambda event: desk.pause(not desk.paused)),
             "Step": ("N", lambda event: desk.step()),
             "Reset": ("R", lambda event: desk.reset()),
             "Undo": ("Z", lambda event: desk.undo()),

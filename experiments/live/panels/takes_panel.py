@@ -47,7 +47,7 @@ class TakesPanel:
         with gui.add_folder("Compare and mix", expand_by_default=False):
             self._other: viser.GuiDropdownHandle[Any] = gui.add_dropdown("With", (NONE,))
             self._compare = gui.add_checkbox(
-                "Show both", False, hint="In place of the default animation; the first with what it took over."
+                "Show both", False, hint="In place of the default animation; the first as mixed."
             )
             self._legend = gui.add_html("")
             self._plot = gui.add_uplot(
@@ -56,7 +56,7 @@ class TakesPanel:
                 title="Force [N]", height=140, scales={"x": {"time": False}}, visible=False,
             )  # fmt: skip
             self._region_slider = gui.add_multi_slider(
-                "Region [s]", 0.0, 10.0, 0.1, (1.0, 3.0), hint="Of the take, that is taken from the other one."
+                "Region [s]", 0.0, 10.0, 0.1, (1.0, 3.0), hint="Part of the take that the other one replaces."
             )
             self._mix = gui.add_button_group("Mix", ("Take over", "Undo"))
             self._export = gui.add_button("Download the mix as BVH", icon=viser.Icon.DOWNLOAD)

@@ -233,7 +233,7 @@ class Desk:
     def undo(self) -> None:
         """Undo the last action: a bend or a change of gains."""
         if not self._undo_stack:
-            self._say("Nothing is left to undo.")
+            self._say("Nothing to undo.")
             return
         doing = self._undo_stack.pop()
         self._redo_stack.append(doing)
@@ -246,7 +246,7 @@ class Desk:
     def redo(self) -> None:
         """Redo the last undone action."""
         if not self._redo_stack:
-            self._say("Nothing is left to do again.")
+            self._say("Nothing to redo.")
             return
         doing = self._redo_stack.pop()
         self._undo_stack.append(doing)
@@ -302,7 +302,7 @@ class Desk:
             self._watch_time = now
         elif now - self._watch_time > UNATTENDED_TIMEOUT:
             self._watch_time = now
-            self._say(f"The take was ended: for {UNATTENDED_TIMEOUT:g} s no browser had the page.")
+            self._say(f"The take was ended: no browser was connected for {UNATTENDED_TIMEOUT:g} s.")
             self.stop()
 
     def stop(self) -> None:
@@ -326,7 +326,7 @@ class Desk:
                 "hvf prepare takes larger ones"
             )
         if self.preparing is not None:
-            raise SimError(f"{self.preparing[0]} is being prepared; expected one file after the other")
+            raise SimError(f"{self.preparing[0]} is being prepared; expected one file at a time")
         uploads = self.folder / "uploads"
         uploads.mkdir(parents=True, exist_ok=True)
         (uploads / file).write_bytes(content)

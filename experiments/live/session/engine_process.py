@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
-from controllers.safety.faults import FAULT_CODE
+from controllers.safety.faults import FAULT_CODE, FAULT_VALUE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
 from experiments.live.session.board import Board
 from experiments.live.session.engine import Drag, Engine
@@ -189,7 +189,7 @@ class _EngineLoop:
     def _build(self, order: Build) -> None:
         if self._engine is not None:
             self._stop(self._engine)
-        self._answers.put(Progress("putting the run together", 0.1))
+        self._answers.put(Progress("setting up the run", 0.1))
         session = wire(order.config, ready=self._compile)
         self._engine = Engine(session)
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
@@ -220,7 +220,7 @@ class _EngineLoop:
         self._last_picture_time = now
         trace, hand = engine.memory, servo.device.hand
         shown: dict[str, Any] = {
-            "t": engine.time, "fault": servo.device.faults[FAULT_CODE], "performs": engine.performs,
+            "t": engine.time, "fault": servo.device.faults[[FAULT_CODE, FAULT_VALUE]], "performs": engine.performs,
             "recording": 0.0 if self._take is None else self._take.seconds(engine) + engine.period,
             "qpos": shown_configuration(servo),
             "reference": servo.reference.pose, "p": hand[POSITION], "switch": hand[HAND_SWITCH],

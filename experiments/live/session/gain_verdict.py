@@ -64,7 +64,7 @@ class GainVerdicts:
         """Yield the verdicts on all laws of a run: first without margins, as soon as they are known, then with them."""
         try:
             if any(law.law == "leading" for law in certified_laws(config).values()):
-                reason = "of a figure that is led it takes longer than a slider waits; hvf certify --mode lead says"
+                reason = "for a led figure this takes too long here; use hvf certify --mode lead"
                 yield (GainVerdict("field", "unknown", reason, None, ""),)
                 return
             rivers, drag, missing = certified_rivers(config), governor_drag(config), uncertified_parts(config)
@@ -103,7 +103,7 @@ class GainVerdicts:
             return GainVerdict(
                 law, "unknown", f"near the boundary, between two phases of the grid; {gains}", None, remark
             )
-        return GainVerdict(law, "certified", f"dies away at every phase, with every hand; {gains}", None, remark)
+        return GainVerdict(law, "certified", f"decays at every phase, with every hand; {gains}", None, remark)
 
     def _verdict_with_margin(self, name: str, river: River) -> GainVerdict:
         verdict = self._cached_verdict(name, river)
@@ -124,7 +124,7 @@ class GainVerdicts:
         margin = None if field_verdict.margin is None else min(field_verdict.margin, certified_drag / drag - 1.0)
         if certified_drag > drag:
             return field_verdict._replace(reason=f"{field_verdict.reason}; {remark}", margin=margin)
-        reason = f"{remark}; hvf certify says whether it shakes; {field_verdict.reason}"
+        reason = f"{remark}; hvf certify says whether it oscillates; {field_verdict.reason}"
         return field_verdict._replace(verdict="unknown", reason=reason, margin=margin)
 
     def _river_loops(self, river: River) -> tuple[list[SampledLoop], list[SampledLoop]]:

@@ -10,7 +10,7 @@ COURSE_POINTS = 241  # points at which the bent curve is drawn
 SLICE_SIDE = 9  # points along each side of the field's slice
 
 SHOWN = {
-    "t": 1, "cost": 2, "pace": 1, "fault": 1, "bends": 1, "performs": 1, "recording": 1, "curve": 1, "qpos": 256,
+    "t": 1, "cost": 2, "pace": 1, "fault": 2, "bends": 1, "performs": 1, "recording": 1, "curve": 1, "qpos": 256,
     "ghost": 75, "reference": 75, "p": 3, "force": 3, "user": 3, "target": 3, "switch": 1, "distance": 1,
     "residual": 1, "course": 3 * COURSE_POINTS,
     "slice": 6 * SLICE_SIDE**2,

@@ -25,7 +25,7 @@ from sim.recording.recording import Recording
 
 LIVE = "dragged by hand on the live page; no configuration says what the hand did"
 """Text ``live`` of a take's recording, which marks that it cannot be reproduced from its configuration."""
-MIN_TAKE_DURATION = 0.5  # [s] shortest take that is measured; a shorter one is a mouse slip
+MIN_TAKE_DURATION = 0.5  # [s] shortest take that is kept; a shorter one is a mouse slip
 
 
 class Take:
@@ -83,24 +83,17 @@ class Take:
         Raises
         ------
         SimError
-            If it is too short to be measured; the recording is then kept as an interrupted one. Without a tick, it is
-            deleted.
+            If it is too short to be measured; it is then deleted.
         """
         seconds = self.seconds(engine)
-        if not self._tick_count:
+        if not self._tick_count or seconds < MIN_TAKE_DURATION:
             self._recorder.close()
             (self.folder / RECORDING).unlink()
             with suppress(OSError):  # it may hold a user's files
                 self.folder.rmdir()
-            raise SimError(
-                f"{self.folder}: time stood still, and nothing was recorded; expected {MIN_TAKE_DURATION:g} s or more"
-            )
+            lasted = f"a take of {seconds:.2f} s" if self._tick_count else "a take while time was paused"
+            raise SimError(f"{self.folder}: {lasted} is not kept; expected {MIN_TAKE_DURATION:g} s or more")
         self._recorder.flush()
-        if seconds < MIN_TAKE_DURATION:
-            self._recorder.close()
-            raise SimError(
-                f"{self.folder}: a take of {seconds:.2f} s is not measured; expected {MIN_TAKE_DURATION:g} s or more"
-            )
         parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled_spans))
         session = replace(engine.session, parts=parts)
         speed = SpeedSummary(seconds / (time.perf_counter() - self._wall_start), 0.0, peak_memory_mb())

@@ -23,5 +23,5 @@ def fault_lines(recording: Recording) -> tuple[str, ...]:
             lines.append(LatchedFault(Fault(int(codes[row])), t, value).line())
         before = float(codes[-1])
     if gaps:
-        lines.append(f"The servo came late {gaps} times; the force was released and ramped in again.")
+        lines.append(f"The servo was late {gaps} times; the force was released and ramped in again.")
     return tuple(lines)

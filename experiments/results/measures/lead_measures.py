@@ -58,7 +58,7 @@ class LeadSummary:
         none, one, two = self.turn_deg_per_s
         back = "The figure was not led back."
         if self.retrace_cm is not None:
-            back = f"Back it retraced its way within {self.retrace_cm:.2f} cm and {self.retrace_deg:.2f}°"
+            back = f"On the way back it retraced its path within {self.retrace_cm:.2f} cm and {self.retrace_deg:.2f}°"
             if self.physical_retrace_cm is not None:
                 back += (
                     f", the physical figure within {self.physical_retrace_cm:.1f} cm and "

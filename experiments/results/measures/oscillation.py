@@ -71,22 +71,20 @@ class OscillationSummary:
     growth: float | None
 
     def lines(self) -> list[str]:
-        """The finding in words; empty if the loop did not shake."""
+        """The finding in words; empty if the loop did not oscillate."""
         if self.since is None:
             return []
         at = "" if self.frequency is None else f" at {self.frequency:.0f} Hz"
-        shaking = (
-            f"from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}, by up to {self.force_max:.1f} N"
-        )
+        when, force = f"from {self.since:.2f} s on, {100 * self.share:.0f} % of the time{at}", f"{self.force_max:.1f} N"
         if not self.oscillates:
             return [
-                f"Rounded encoders are felt {shaking}: the stylus does not shake; damping makes a force of the steps "
-                "in its reading, less of it is quieter."
+                f"Rounded encoders are felt {when}, in the force by up to {force}: the stylus does not oscillate; "
+                "damping turns the steps of its reading into force, so less damping is quieter."
             ]
         grew = "" if self.growth is None else f", growing at up to {self.growth:.0f}/s"
         return [
-            f"It oscillates: the loop shakes {shaking} and {self.motion_rms_mm:.2f} mm RMS across the curve{grew}; "
-            "hvf certify says which gains are stable."
+            f"It oscillates {when}: the force by up to {force}, the stylus by {self.motion_rms_mm:.2f} mm RMS across "
+            f"the curve{grew}; hvf certify says which gains are stable."
         ]
 
 

@@ -45,7 +45,7 @@ class PressSummary:
             "pushed": f"pushed{where} by {self.dragged_mm:.1f} mm from outside",
             "undo": "undone",
             "redo": "redone",
-            "nothing": "pressed in vain",
+            "nothing": "pressed without effect",
         }[self.what]
 
 

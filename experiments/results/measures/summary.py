@@ -69,7 +69,7 @@ class RunSummary:
         warnings_text = ", ".join(f"{name} ×{count}" for name, count in self.warnings.items()) or "none"
         bent = [] if self.stretch is None else [self.stretch.line()]
         changed = [f"Rivers: {'; '.join(change.line() for change in self.changes)}."] if self.changes else []
-        held = f"The energy tank held the field back at {self.tank.scaled_ticks} ticks."
+        held = f"The energy tank reduced the force at {self.tank.scaled_ticks} ticks."
         return [
             *self.faults,
             *([fall_line] if figure is not None and (fall_line := figure.fall_line()) else []),

@@ -69,7 +69,7 @@ class PathSummary:
     def line(self) -> str | None:
         """When the stylus stopped and at what pace the clips were played, in words; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
-        paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their own pace."
+        paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their recorded speed."
         return " ".join(part for part in (stopped, paced) if part) or None
 
     @property

@@ -61,7 +61,6 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
     RecordingError
         If the recording lacks a channel that is drawn.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     files: list[Path] = []
     drawings: dict[str, Callable[[Recording], Figure]] = {
         "path": path_figure,
@@ -76,6 +75,7 @@ def draw_figures(recording: Recording, folder: Path) -> list[Path]:
     for name, draw in drawings.items():
         with mpl.rc_context(STYLE):
             drawing = draw(recording)
+            folder.mkdir(parents=True, exist_ok=True)  # only now: a recording without rows leaves no folder
             files.append(folder / f"{name}.png")
             drawing.savefig(files[-1], dpi=150)
     return files

@@ -34,13 +34,14 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     lines : sequence of str
         What happened, one sentence per line.
     """
-    (folder / FIGURES).mkdir(exist_ok=True)
     images: list[str] = []
     figures = {"forces": forces_figure, "twin": twin_figure, "servo": servo_figure, "link": link_figure}
     for name, draw in figures.items():
         file = folder / FIGURES / f"{name}.png"
         with mpl.rc_context(STYLE):
-            draw(recording).savefig(file, dpi=150)
+            drawing = draw(recording)
+            file.parent.mkdir(exist_ok=True)  # only now: a recording without rows leaves no folder
+            drawing.savefig(file, dpi=150)
         images.append(image(file, name))
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     body = f"<ul>{items}</ul>{''.join(images)}"
@@ -52,7 +53,7 @@ def forces_figure(recording: Recording) -> Figure:
     """Force commanded by the field, force after the gate, and distance from the curve; states of the gate shaded."""
     t, asked, force = (thinned_rows(recording, name) for name in ("t", "asked", "force"))
     figure, (above, below) = _panels(2)
-    above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="asked for by the field")
+    above.plot(t, np.linalg.norm(asked, axis=1), color="#9aa3b2", label="requested by the field")
     above.plot(t, np.linalg.norm(force, axis=1), color=FIELD, label="let through to the motors")
     above.set(title="force on the hand", ylabel="[N]")
     below.plot(t, 1e3 * thinned_rows(recording, "distance"), color=AXES[0])
@@ -79,7 +80,7 @@ def twin_figure(recording: Recording) -> Figure:
     apart.set(title="from the prediction of a tick to its measurement", ylabel="[µm]")
     sizes = np.linalg.norm(thinned_rows(recording, "hand_force"), axis=1)
     force.plot(thinned_rows(recording, "t"), sizes, color=USER)
-    force.set(title="force of the hand, as the twin tells it", xlabel="t [s]", ylabel="[N]")
+    force.set(title="force of the hand, estimated by the twin", xlabel="t [s]", ylabel="[N]")
     return figure
 
 
@@ -93,7 +94,7 @@ def servo_figure(recording: Recording) -> Figure:
         axes.loglog(1e6 * values[-ranks], share[-ranks], color=color, label=label)
     period = 1e6 / recording.rates["ticks"]
     axes.axvline(period, color="#222a38", lw=0.8, ls=(0, (4, 3)), label="a period")
-    axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="share of ticks")
+    axes.set(title="times of the servo", xlabel="longer than [µs]", ylabel="fraction of ticks")
     axes.legend(loc="lower left")
     return figure
 

@@ -24,6 +24,6 @@ def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMap
     flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
     remark = (
         f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
-        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' own pace"
+        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' recorded speed"
     )
     return replace(parts, size=size, remarks=parts.remarks + ((remark,) if flying else ()))

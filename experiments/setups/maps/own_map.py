@@ -31,7 +31,7 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
     haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _N_COMPARED, endpoint=False)))
 
     def none(*_: object) -> Any:
-        raise ParameterError("a map of one's own has no rivers; expected another field")
+        raise ParameterError("a user-defined map has no rivers; expected another field")
 
     return ClipMapParts(
         haptic_map=cast(ClipMap, haptic_map), clips=(), curve=check_reach(curve), reach=Circle().radius, rivers=none,

@@ -53,7 +53,7 @@ def river_clips_setup(
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, not_followed(changing, names, config.figure, figure)
 
-    remark = f"a round of the clips takes {laps} laps of the hand, so that each keeps its pace"
+    remark = f"a round of the clips takes {laps} laps of the hand, so that each keeps its speed"
     return replace(parts.with_remarks((remark,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
 
 

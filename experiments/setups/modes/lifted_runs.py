@@ -132,7 +132,7 @@ def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple
         return made, ()
     names = f"{made.names[transition.first]} and {made.names[transition.second]}"
     return made, (
-        f"where {names} agree, their places over the floor are {apart:.1f} m apart: a push over carries the figure "
+        f"where {names} agree, their positions on the floor are {apart:.1f} m apart: a push over carries the figure "
         "there within a quarter of a second, and it may fall; clips that stay in place, or keep going, suit better",
     )
 

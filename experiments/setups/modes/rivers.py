@@ -63,8 +63,8 @@ def slow_remark(pace: float) -> tuple[str, ...]:
     if pace >= MIN_PUSHED_RIVER_SPEED:
         return ()
     return (
-        f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slow, a push that takes it out of one takes it out of "
-        f"all, and --user push does not; above {1e3 * MIN_PUSHED_RIVER_SPEED:.0f} mm/s it does (a shorter --lap, a "
+        f"the rivers lead the hand at {1e3 * pace:.1f} mm/s: so slowly that a push out of one is a push out of all, "
+        f"so --user push does not push; above {1e3 * MIN_PUSHED_RIVER_SPEED:.0f} mm/s it does (a shorter --lap, a "
         "larger --radius)",
     )
 

@@ -187,7 +187,7 @@ def handling_spans(user: User) -> tuple[tuple[float, float], ...]:
 def turning_remark(user: User, oriented: bool) -> tuple[str, ...]:
     """Remark, if the hand turns the stylus on a map that ignores its orientation."""
     if user.does == "turn" and not oriented:
-        return ("the hand turns the stylus, and this map does not look at that; --expressive does",)
+        return ("the hand turns the stylus, but this map ignores its orientation; use --expressive",)
     return ()
 
 

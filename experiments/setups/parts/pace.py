@@ -119,7 +119,9 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     check_kind("curve", curve, Trajectory)
     checked("stiffness", stiffness, "N/m", infinite=True)
     if checked("drag", drag, "N s/m") == 0.0:
-        raise ParameterError(f"drag must be more than 0 N s/m, got {drag}: without it no field leads a hand at a pace")
+        raise ParameterError(
+            f"drag must be more than 0 N s/m, got {drag}: without it no field leads a hand at a given speed"
+        )
     times = np.asarray(curve.times)
     own, middles = np.diff(times), 0.5 * (times[1:] + times[:-1])
     speed = np.linalg.norm(curve.velocity(middles), axis=1)

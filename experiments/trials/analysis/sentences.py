@@ -39,7 +39,7 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
 def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, reason: str) -> str:
     name = MEASURES[measure].name.replace("_", " ")
     if not contrasts:
-        return f"Of {name}, nothing can be said: {reason}."
+        return f"Of {name}, there is no result: {reason}."
     comparisons = "; ".join(_comparison(contrast) for contrast in contrasts)
     return f"{name[0].upper()}{name[1:]}, by {factor}: {comparisons}."
 
@@ -51,7 +51,7 @@ def _missing_reason(frame: Any, measure: str) -> str:
     values = frame.loc[frame["state"].eq("done"), measure].dropna()
     if not len(values):
         return "no trial has it"
-    return "it was the same in all trials" if values.nunique() == 1 else "no level has both it and one to hold against"
+    return "it was the same in all trials" if values.nunique() == 1 else "no level has both it and a reference"
 
 
 def _comparison(c: Contrast) -> str:

@@ -142,8 +142,8 @@ def statistics(
     return Statistics(_with_corrected_p(contrasts), interactions, remark_lines)
 
 
-_NO_MODEL_REMARK = "users differ by nothing that a mixed model could be fitted to; the bootstrap interval stands alone"
-_NOT_CONVERGED_REMARK = "the mixed model did not converge; the bootstrap interval stands alone"
+_NO_MODEL_REMARK = "users differ too little to fit a mixed model; only the bootstrap interval is given"
+_NOT_CONVERGED_REMARK = "the mixed model did not converge; only the bootstrap interval is given"
 
 
 def _with_model(

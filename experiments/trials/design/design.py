@@ -123,7 +123,7 @@ def _check_design(study: StudyConfig) -> None:
             )
         if len(levels) < 2:
             present = f"one level, {next(iter(levels))!r}" if levels else "no levels"
-            raise StudyError(f"{where}: factor {name!r} has {present}; expected two or more, or its words under [run]")
+            raise StudyError(f"{where}: factor {name!r} has {present}; expected two or more, or its option under [run]")
     _check_between(study, where)
     groups = math.prod(len(study.factors[name]) for name in study.between)
     count = math.prod(map(len, study.factors.values()))
@@ -138,7 +138,7 @@ def _check_design(study: StudyConfig) -> None:
             )
     for word, owner in (("person", "users"), ("seconds", "seconds"), ("seed", "seed")):
         if word in study.run or any(word in _all_words(levels.values()) for levels in study.factors.values()):
-            raise StudyError(f"{where} sets {word!r} as a word of its runs; expected {owner!r} of the study itself")
+            raise StudyError(f"{where} sets {word!r} as an option of its runs; expected {owner!r} of the study itself")
 
 
 def _check_between(study: StudyConfig, where: str) -> None:
@@ -146,7 +146,7 @@ def _check_between(study: StudyConfig, where: str) -> None:
         if name not in study.factors:
             raise StudyError(f"{where}: no factor {name!r} to vary between users; there are {', '.join(study.factors)}")
     if len(set(study.between)) < len(study.between):
-        raise StudyError(f"{where}: a factor stands twice in between; expected {sorted(set(study.between))}")
+        raise StudyError(f"{where}: a factor appears twice in between; expected {sorted(set(study.between))}")
 
 
 def _all_words(levels: Iterable[Words]) -> set[str]:

@@ -132,9 +132,7 @@ def _base_config(study: StudyConfig, person: Person, condition: Condition) -> Ru
         level_text = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
         raise StudyError(f"study {study.name!r}, condition {level_text}: {to_keywords(str(error))}") from None
     except TypeError as error:
-        raise StudyError(
-            f"study {study.name!r}: {error}; expected words of a run, as `hvf run --help` has them"
-        ) from None
+        raise StudyError(f"study {study.name!r}: {error}; expected options of a run, as in `hvf run --help`") from None
 
 
 def _check_distinct(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:

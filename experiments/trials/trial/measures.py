@@ -62,13 +62,13 @@ _EXPRESSIVE = (
     "RMS distance in R³ × SO(3)^18 of the edited animation from the default one, while the hand means to leave the "
     "curve: what is expressed, not what trembles"
 )
-_SEEN = "the same as it is seen: RMS distance of the 18 segments in space"
+_SEEN = "the same as seen: RMS distance of the 18 segments in space"
 
 MEASURES: dict[str, Measure] = {
     measure.name: measure
     for measure in (
         Measure("tracking_error", "mm", "less", _TRACKING),
-        Measure("completion", "", "more", "share of the curve's own pace that was gone along it, at most 1"),
+        Measure("completion", "", "more", "speed along the curve over the curve's own, at most 1"),
         Measure("effort", "N² s", "less", "∫ F² dt of the hand's force on the stylus"),
         Measure("hand_work", "mJ", "less", "∫ |F·v| dt of the hand: muscles pay for braking, too"),
         Measure("energy_exchanged", "mJ", "less", _EXCHANGED),
@@ -77,7 +77,7 @@ MEASURES: dict[str, Measure] = {
         Measure("expressiveness", "rad", "more", _EXPRESSIVE, "kinematic"),
         Measure("expressiveness_seen", "cm", "more", _SEEN, "kinematic"),
         Measure("ballistic_error", "", "less", "RMS residual force in flight over body weight", "physical"),
-        Measure("contact_error", "", "less", "share of stance without the ground's support", "physical"),
+        Measure("contact_error", "", "less", "fraction of stance without ground support", "physical"),
         Measure("fell", "", "less", "whether the figure fell", "physical"),
         Measure("faults", "", "less", "faults of the device that were latched"),
         Measure("margin_used", "", "less", "k_r over the critical k_r of the stability certificate, 1 at the boundary"),

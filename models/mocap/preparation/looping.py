@@ -121,9 +121,7 @@ def close_or_rest(
     if mirror:
         half = _find_half_stride(clip) if wish == "auto" else (*_requested_frames(clip, wish), np.nan)
         if half is None:
-            raise ModelError(
-                f"{clip.name}: --mirror, but no part of it ends like its start in a mirror; expected a gait"
-            )
+            raise ModelError(f"{clip.name}: --mirror, but no part of it ends like its start mirrored; expected a gait")
         return _close(clip, *half, half=True)
     if clip.n_frames < 8 or wish == "open":
         return _bring_to_rest(clip, within)

@@ -113,7 +113,7 @@ class WellFormed:
                 f"{1000 * MAX_SKATE:.0f} at most"
             )
         if self.outliers:
-            found.append(f"{self.outliers} frames stand out by their acceleration; 0 at most")
+            found.append(f"{self.outliers} frames are outliers in acceleration; 0 at most")
         if self.closed and self.seam > MAX_SEAM_VELOCITY_JUMP:
             found.append(
                 f"velocities at the seam differ by {exceeding_text(self.seam, MAX_SEAM_VELOCITY_JUMP)} rad/s; "
@@ -126,14 +126,14 @@ class WellFormed:
             )
         if self.flight_error > MAX_FLIGHT_ACCELERATION_ERROR:
             found.append(
-                f"flights fall with {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} m/s² beside "
-                f"gravity; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
+                f"flights differ from gravity by {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} "
+                f"m/s²; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
             )
         if self.excess > MAX_LIMIT_EXCESS:
             found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
         if self.residual > (bound := RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
             found.append(
-                f"contact lacks {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
+                f"contact leaves a residual of {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
                 f"{100 * bound:.0f} % at most"
             )
         if self.strain > 1.0:
@@ -150,8 +150,8 @@ class WellFormed:
             f"({1000 * self.slid:.0f} in the worst stance)",
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "
             f"{'seam differ by' if self.closed else 'ends'} {self.seam:.2f} rad/s",
-            f"{self.outliers} frames stand out; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
-            f"{self.flights} flights, {self.flight_error:.1f} m/s² beside gravity; contact lacks "
+            f"{self.outliers} outlier frames; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
+            f"{self.flights} flights, {self.flight_error:.1f} m/s² from gravity; contact leaves a residual of "
             f"{100 * self.residual:.1f} % of weight; {self.joint} needs {100 * self.strain:.0f} % of its torque limit",
         )
 

@@ -280,7 +280,7 @@ def _absent_bone_remarks(names: list[str]) -> Iterator[str]:
     if names:
         listed = ", ".join(map(quoted, names[:8])) + (", …" if len(names) > 8 else "")
         has, are = ("has", "it is") if len(names) == 1 else ("have", "they are")
-        yield f"{listed} {has} no values in any frame: {are} taken as not turned"
+        yield f"{listed} {has} no values in any frame: {are} taken as unrotated"
 
 
 def _frame_number(word: str, frame_numbers: list[int], path: Path, line: int) -> int:

@@ -85,7 +85,10 @@ def read_bvh(path: Path) -> SourceMotion:
         if _length_misfit(local, offsets, placed) < _MAX_WORLD_MISFIT:
             translations = local
             listed = ", ".join(names[k] for k in placed)
-            remarks = (*remarks, f"the places of {listed} are given in the world, not from their parents: read so")
+            remarks = (
+                *remarks,
+                f"the positions of {listed} are given in the world, not relative to their parents: read so",
+            )
     return SourceMotion(
         path, names, parents, offsets, tips, rotations, translations, fps, None, remarks=remarks, further_tips=further
     )

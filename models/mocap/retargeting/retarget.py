@@ -46,8 +46,8 @@ from models.mocap.retargeting.upright import check_biped, check_sides, unsupport
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()
 _PROPPED_REMARK = (
-    "for {:.1f} s the body's weight is beside its feet and all else that is low: what it sits, hangs or leans on is "
-    "not in the file, and the figure has to do without, unless feet are missing or it plays slower than it was recorded"
+    "for {:.1f} s the body's weight is above neither its feet nor any other low part: what it sits, hangs or leans on "
+    "is not in the file, and the figure lacks it, unless feet are missing or the file plays slower than recorded"
 )
 _SITTING_REMARK = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
@@ -164,7 +164,7 @@ def _frames(motion: SourceMotion, roles: Roles, rest: int | None) -> _Frames:
 def _calibrate_body(motion: SourceMotion, roles: Roles, frames: _Frames, up: Array, rest: int | None) -> Calibration:
     """The body on the figure's segments, or an error if its joints do not define them."""
     unclear = MotionFileError(
-        motion.path, 0, "its joints do not tell how the body stands", "a trunk, thighs and shanks that have a length"
+        motion.path, 0, "its joints give the body no orientation", "a trunk, thighs and shanks that have a length"
     )
     frame = None if rest is None else rest - frames.first
     try:

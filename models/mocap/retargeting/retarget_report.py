@@ -101,7 +101,7 @@ class RetargetReport(NamedTuple):
 
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
-        how = "the format or you said so" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
+        how = "given or known from the format" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
         named = ", ".join(self.unused[:_MAX_NAMED])
         lines = (
             f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",
@@ -119,7 +119,7 @@ class RetargetReport(NamedTuple):
         frames = "frame" if self.dropped == 1 else f"{self.dropped} frames"
         lines = (
             *(["missing: " + ", ".join(self.missing)] if self.missing else []),
-            *([f"left out: the first {frames}, a pose that is not of the motion"] if self.dropped else []),
+            *([f"left out: the first {frames}, a pose that is not part of the motion"] if self.dropped else []),
             *self.remarks,
         )
         return tuple(printable(line, 4000) for line in lines)
@@ -136,7 +136,7 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
         if largest[k] > _MIN_RANGE_EXCESS
     ]
     if listed:
-        yield f"beyond the figure's range: {', '.join(listed)}; see whether the file has it so"
+        yield f"beyond the figure's range: {', '.join(listed)}; check the file"
 
 
 def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
@@ -147,12 +147,12 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
         if count < min(_MIN_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     if few:
-        remark = "how the soles lie is a guess, since few frames tell"
-        yield f"{remark} ({', '.join(few)}); --rest-frame would say it"
+        remark = "the soles' orientation is estimated from few frames"
+        yield f"{remark} ({', '.join(few)}); give --rest-frame"
     if sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
-        yield "there is one arm: how the chest lies is a guess, for the other shoulder is taken to be opposite"
+        yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
     if calibrated.bend > _MAX_SPINE_BEND:
-        yield "the body never stands straight: how its spine is at rest is a guess; --rest-frame would say it"
+        yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 
 
 def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
@@ -161,7 +161,7 @@ def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
     named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
-        yield f"nothing tells where {', '.join(without)} end: how they point is a guess"
+        yield f"nothing tells where {', '.join(without)} end: their directions are estimated"
 
 
 def frame_remarks(
@@ -170,10 +170,10 @@ def frame_remarks(
     """A frame time that is not stated or long, lost frames, a last frame left out, and jumps that remain."""
     if not timed:
         remark = f"the file states no frame rate: {fps:g} a second are assumed"
-        yield f"{remark}; if it is another, state it with --frame-rate"
+        yield f"{remark}; if it is another, give it with --frame-rate"
     if fps < MIN_FRAME_RATE:
         remark = f"a frame lasts {two_digits(1.0 / fps)} s, longer than a camera's"
-        yield f"{remark}: if that is not so, state its --frame-rate"
+        yield f"{remark}: if that is wrong, give --frame-rate"
     if broken:
         n = len(broken)
         which = f"frame {broken[0]}" if n == 1 else f"{n} frames, the first of them frame {broken[0]},"
@@ -182,14 +182,14 @@ def frame_remarks(
         yield "the last frame did not belong to the motion before it: left out"
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
-        yield f"the whole body jumps in a frame at {times}: what is lost there is too long to be interpolated"
+        yield f"the whole body jumps in a frame at {times}: the gap there is too long to be interpolated"
 
 
 def padding_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:
     """Padding frames (n,) at the ends of a motion; `fps` and `dropped` as in `floor_remarks`."""
     if filled.any():
         remark = f"nothing moves at all for {_duration_text(spans(filled), fps, dropped)}"
-        yield f"{remark}, as where programs fill a motion up: soles, limbs and floor are told by the other frames"
+        yield f"{remark}, as where programs pad a motion: soles, limbs and floor are estimated from the other frames"
 
 
 def leg_speed_remarks(legs: Array, fps: float) -> Iterator[str]:
@@ -206,7 +206,7 @@ def leg_speed_remarks(legs: Array, fps: float) -> Iterator[str]:
     swift = float(np.quantile(speeds, _SPEED_QUANTILE)) if len(speeds) else 0.0
     if swift > _MAX_ANKLE_SPEED:
         remark = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
-        yield f"{remark}: if {fps:g} frames a second are not so, state the --frame-rate"
+        yield f"{remark}: if {fps:g} frames a second are wrong, give --frame-rate"
 
 
 def in_place_remarks(path: Array, ankles: Array, fps: float) -> Iterator[str]:
@@ -244,13 +244,15 @@ def joint_jump_remarks(jumps: Sequence[JointJump], motion: SourceMotion) -> Iter
             for k, joint, angle in largest
         )
         others = f" and {len(jumps) - len(largest)} more" if len(jumps) > len(largest) else ""
-        yield f"joints jump within a frame, the others do not: {which}{others}; see whether the file has it so"
+        yield f"joints jump within a frame, the others do not: {which}{others}; check the file"
 
 
 def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
     """Skeletons whose hips are at the same place, only one of which is used."""
     if hips:
-        remark = f"{len(hips)} skeletons have their hips at one place ({', '.join(hips)}): that of {taken} is taken"
+        remark = (
+            f"{len(hips)} skeletons have their hips at the same position ({', '.join(hips)}): that of {taken} is used"
+        )
         yield f'{remark}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
 
 
@@ -271,7 +273,7 @@ def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> It
     aloft = [span for span in spans(clearance > _MIN_ALOFT_HEIGHT) if span[1] - span[0] > _MIN_ALOFT_TIME * fps]
     if aloft:
         high = max(float(clearance[start:end].max()) for start, end in aloft)
-        how = f"up to {high:.2f} m above the floor, for {_duration_text(aloft, fps, dropped)}, which no flight lasts"
+        how = f"up to {high:.2f} m above the floor, for {_duration_text(aloft, fps, dropped)}, longer than any flight"
         fall = min(_fall_acceleration(root[start:end, 2], fps) for start, end in aloft)
         why = "it stands on something that is not in the file, or its place is in another unit than its bones"
         if np.ptp(root, axis=0).max() < _MAX_PINNED_MOTION:
@@ -284,7 +286,7 @@ def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> It
     beneath = spans(clearance < -_MIN_DEPTH)
     if beneath:
         how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_duration_text(beneath, fps, dropped)}"
-        yield f"parts of the body are {how}; see whether the file has it so"
+        yield f"parts of the body are {how}; check the file"
 
 
 def _fall_acceleration(heights: Array, fps: float) -> float:
@@ -317,9 +319,9 @@ def axis_name(direction: Array) -> str:
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
     """The unit in which the performer's legs are about as long as the figure's."""
     if unit is not None:
-        description = f"{unit:.5g} m (the format says so), legs {leg * unit:.2f} m"
+        description = f"{unit:.5g} m (fixed by the format), legs {leg * unit:.2f} m"
         human = _MIN_LEG_LENGTH <= leg * unit <= _MAX_LEG_LENGTH
-        return description if human else f"{description}, which are no human's: the file's unit is another"
+        return description if human else f"{description}, which is not human: the file's unit is another"
     name, unit = min(_UNITS, key=lambda known: abs(np.log(leg * known[1] / own_leg)))
     likely = abs(np.log(leg * unit / own_leg)) < np.log(1.3)
     return f"{name} (worked out), legs {leg * unit:.2f} m" if likely else f"unknown, legs {leg:.4g} units"

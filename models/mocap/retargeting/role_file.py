@@ -56,7 +56,7 @@ def stated_roles(
         _check_order(path, named, motion)
         roles = assembled(named, names_of(motion.joints), motion.parents)
     if isinstance(roles, str):
-        raise MotionFileError(path, 0, f"no joint is taken for the {roles}", "the skeleton of a human")
+        raise MotionFileError(path, 0, f"no joint was found for the {roles}", "the skeleton of a human")
     return motion, roles
 
 

@@ -40,4 +40,4 @@ def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
             if np.median(moment) > _MAX_DISTANCE_RATIO * np.median(length) ** 2:
                 name, known = motion.joints[joint], f"{motion.joints[start]} and {motion.joints[end]}"
                 what = f"the {part.replace('_', ' ')} bends at {name}, between {known}"
-                raise MotionFileError(motion.path, 0, what, "names that are known, or --roles FILE that says them")
+                raise MotionFileError(motion.path, 0, what, "known names, or --roles FILE")

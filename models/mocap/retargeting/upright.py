@@ -124,7 +124,7 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     # Without ankles, the lowest joints are knees, which do not support a squat.
     if not clear or np.isnan(lines.ankles).any():
         raise MotionFileError(
-            motion.path, 0, f"the motion does not tell what is up ({best} or {second})", f"--up {best} or --up {second}"
+            motion.path, 0, f"the up axis cannot be inferred ({best} or {second})", f"--up {best} or --up {second}"
         )
     return Up(np.array(AXES[best], dtype=np.float64), lead)
 
@@ -306,7 +306,7 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     knees = lines.knee_normals() @ left[:, :, None]
     signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
     clear = [np.sign(s) for s in signs if abs(s) > _MIN_EVIDENCE]
-    stated = "left and right as the names say, or --roles FILE that says them"
+    stated = "left and right as named, or --roles FILE"
     shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
     if lines.has_arms and np.sum(lines.left * shoulders) < 0.0:
         which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"

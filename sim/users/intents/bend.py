@@ -36,7 +36,7 @@ class Bend:
             raise SimError("a person who bends a curve has no grabs; expected one or more")
         grab_table(self.grabs)
         if any(grab.place is None for grab in self.grabs):
-            raise SimError("a person's grab has no place; expected where she takes hold, in H [m]")
+            raise SimError("a person's grab has no position; expected where it takes hold, in H [m]")
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""

@@ -73,7 +73,7 @@ class Own:
         check_field_types(self)
         check_callable("function", self.function, "t", "place", "force", *(("rows",) if self.compiled else ()))
         if not (np.isfinite(self.every) and self.every > 0.0):
-            raise SimError(f"an intent that is asked every {self.every} s; expected more than 0 s")
+            raise SimError(f"an intent that is evaluated every {self.every} s; expected more than 0 s")
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
@@ -115,4 +115,6 @@ class Own:
             person.wishes[:] = Wishes(rows, OWN).rows
         except (TypeError, ValueError):
             name = getattr(self.function, "__name__", "function")
-            raise SimError(f"the intent {name} gave {result!r}; expected a place of three numbers, or a Wish") from None
+            raise SimError(
+                f"the intent {name} gave {result!r}; expected a position (three numbers) or a Wish"
+            ) from None

@@ -35,7 +35,7 @@ class Press:
         if len(self.pushes) == 0:
             raise SimError("a person who pushes has no pushes; expected one or more")
         if any(push.place is not None for push in self.pushes):
-            raise SimError("a person's push has a place; expected a time and a direction")
+            raise SimError("a person's push has a position; expected a time and a direction")
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""

@@ -58,6 +58,6 @@ def check_steps(person: Person, physics_step: float) -> None:
                                - person.reflex_gain * person.reflex_delay * stiffness)  # fmt: skip
     if damping_margin[0] <= 0.0:
         raise SimError(
-            f"the reflexes of person {person.name!r} shake her arm: reflex_gain {person.reflex_gain:g} with "
+            f"the reflexes of person {person.name!r} make the arm oscillate: reflex_gain {person.reflex_gain:g} with "
             f"reflex_delay {person.reflex_delay:g} s; expected less of either, or more damping"
         )

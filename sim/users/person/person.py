@@ -31,7 +31,7 @@ class Interval(NamedTuple):
 INTERVALS = {
     "age": Interval(18.0, 90.0, "years", "adults"),
     "skill": Interval(
-        0.0, 1.0, "", "share of the arm's inertia that the motor command foresees; most of it: Gordon et al. 1994 II"
+        0.0, 1.0, "", "fraction of the arm's inertia that the motor command compensates; most: Gordon et al. 1994 II"
     ),
     "grip": Interval(0.5, 10.0, "N", "Fu & Cavusoglu 2012 (a): 1 to 3 N on this very device; up to 10 N when asked to"),
     "mass": Interval(0.1, 2.5, "kg", "Speich et al. 2005: 1.46 kg (m); hand and wrist alone some 0.1 to 0.5 kg"),
@@ -56,12 +56,12 @@ INTERVALS = {
     "reflex_delay": Interval(
         0.03, 0.06, "s", "Kurtzer 2015 (a): short latency reflex of the arm 20 to 45 ms, long latency from 50 ms on"
     ),
-    "reflex_gain": Interval(0.0, 0.5, "", "share of stiffness and damping that is reflex, not muscle"),
+    "reflex_gain": Interval(0.0, 0.5, "", "fraction of stiffness and damping that is reflex, not muscle"),
     "visual_delay": Interval(
         0.15,
         0.25,
         "s",
-        "until what is seen is corrected: Saunders & Knill 2005 (a) 0.12 to 0.2, Keele & Posner 1968 (q) 0.26",
+        "until a seen error is corrected: Saunders & Knill 2005 (a) 0.12 to 0.2, Keele & Posner 1968 (q) 0.26",
     ),
     "felt_noise": Interval(
         0.0, 0.02, "m", "van Beers et al. 1998 (a): shoulder and elbow are felt to 0.6 to 1.1°, 5 to 10 mm at the hand"
@@ -83,11 +83,11 @@ INTERVALS = {
         0.0, 0.35, "m/s²", "Wade, Gresty & Findley 1982, postural tremor of 97 people (a): 0.015 to 0.34"
     ),
     "tremor_frequency": Interval(6.0, 12.0, "Hz", "Lakie et al. 2015 (a): a clear peak between 6 and 12 Hz"),
-    "correction": Interval(0.0, 1.0, "", "share of a perceived error that the next submovement makes up for"),
-    "caution": Interval(1.0, 4.0, "", "standard deviations of her own scatter that a person keeps within a target"),
-    "entrainment": Interval(0.0, 5.0, "1/s", "how fast her own clock gives way to a motion that runs ahead or behind"),
+    "correction": Interval(0.0, 1.0, "", "fraction of a perceived error that the next submovement corrects"),
+    "caution": Interval(1.0, 4.0, "", "standard deviations of a person's own scatter kept within a target"),
+    "entrainment": Interval(0.0, 5.0, "1/s", "rate at which a person's clock adapts to a motion ahead or behind"),
     "learning": Interval(
-        0.0, 0.5, "", "share learned a repetition: Smith et al. 2006 (q): 0.23, of which 0.21 is soon forgotten"
+        0.0, 0.5, "", "fraction learned per repetition: Smith et al. 2006 (q): 0.23, of which 0.21 is soon forgotten"
     ),
 }
 """Interval of every numeric parameter of a `Person`, with its unit and source."""

@@ -72,8 +72,8 @@ def test_compiled_map_is_identical():
 @pytest.mark.parametrize(
     ("upper", "r_range", "limbs", "message"),
     [
-        ((4,), R, (), "the poses have joints 1 to 3, a group wants 4"),
-        ((0,), R, (), "the poses have joints 1 to 3, a group wants 0"),
+        ((4,), R, (), "the poses have joints 1 to 3, a group needs 4"),
+        ((0,), R, (), "the poses have joints 1 to 3, a group needs 0"),
         ((3,), R, (LEG,), r"a limb of joints \(1, 2, 3\) shares some"),
         ((3,), (0.0, 0.05), (), "r_range must increase from 1 mm or more"),
     ],

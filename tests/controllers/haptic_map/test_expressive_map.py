@@ -150,8 +150,8 @@ def test_lap_memory_of_the_base_is_kept():
     ("joints", "message"),
     [
         ((), "at least one joint"),
-        ((ExpressiveJoint(0, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression wants to turn 0"),
-        ((ExpressiveJoint(4, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression wants to turn 4"),
+        ((ExpressiveJoint(0, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression needs joint 0"),
+        ((ExpressiveJoint(4, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3),), "joints 1 to 3, expression needs joint 4"),
         ((ExpressiveJoint(1, (1.0, np.nan, 1.0), (-1.0,) * 3, (1.0,) * 3),), "gains of joint 1 must be three finite"),
         ((ExpressiveJoint(1, (1.0,) * 3, (1.0,) * 3, (1.0,) * 3),), "range of joint 1 must be three intervals"),
     ],

@@ -149,7 +149,7 @@ def test_with_legs_of_leaves_the_original_map_unchanged():
     np.testing.assert_array_equal(MAP_WITHOUT_LIMBS.pose(x), before)
     assert (MAP_WITHOUT_LIMBS.remarks, MAP_WITHOUT_LIMBS.legs_of) == ((), None)
     assert owned.remarks == (
-        "legs and trunk are those of turn wherever the hand is pushed, which bear 50 % of the others' arms",
+        "legs and trunk are those of turn wherever the hand is pushed, with 50 % of the others' arm motion",
     )
 
 

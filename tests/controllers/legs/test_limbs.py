@@ -183,5 +183,5 @@ def test_invalid_limbs_raise_parameter_error(joints, axis, message):
 
 
 def test_limb_with_joints_beyond_the_poses_raises_parameter_error():
-    with pytest.raises(ParameterError, match=r"the poses have 3 joints, a limb wants \(1, 2, 4\)"):
+    with pytest.raises(ParameterError, match=r"the poses have 3 joints, a limb needs \(1, 2, 4\)"):
         Cylindrical(SWAYING, R, Z, [Limb((1, 2, 4), LEG.offsets, LEG.axis, LEG.points)])

@@ -124,16 +124,16 @@ def test_law_that_converts_to_float_is_refuted_by_linearisation_or_unknown(compi
     found = stability(rail, compiled)
     assert found.verdict == "refuted"
     assert "mm off the curve at phase" in found.reason
-    assert "makes a plain number" in found.reason
+    assert "to a plain one" in found.reason
     assert "np.hypot" in found.reason
     # Linearisation at sampled states can refute but not certify: the same law with a soft spring is unknown.
     soft = hvf.certify(simulation(hvf.law(rail)(k=100.0)), NO_HANDS).stability
     assert soft.verdict == "unknown"
-    assert "makes a plain number" in soft.reason
+    assert "to a plain one" in soft.reason
 
 
 def test_symbolic_law_that_differs_from_executed_law_is_rejected():
-    with pytest.raises(ControllerError, match="another force in a run than on symbols, as for a hand at p = "):
+    with pytest.raises(ControllerError, match="another force in a run than symbolically, as for a hand at p = "):
         certified_cases(hvf.law(checking_type), CURVE)
     with pytest.raises(ControllerError, match="numbers that are not finite"):
         certified_cases(hvf.law(lambda hand: (math.nan, 0, 0)), CURVE)
@@ -143,7 +143,7 @@ def test_symbolic_law_that_differs_from_executed_law_is_rejected():
         state[0] = 0.9 * state[0] + 0.1 * hand.p[2]
         return 0, 0, -state[0]
 
-    with pytest.raises(ControllerError, match="another force when it is asked again"):
+    with pytest.raises(ControllerError, match="another force when called again"):
         certified_cases(hvf.law(filtered), CURVE)
 
 
@@ -154,7 +154,7 @@ def test_small_force_step_is_unknown_not_refuted():
     found = stability(step)
     assert found.verdict == "unknown"
     assert "where it jumps" in found.reason
-    assert "its force jumps, bends or is no number" in found.reason
+    assert "its force jumps, is kinked or is no number" in found.reason
 
 
 # Piecewise laws: every case counts.
@@ -240,7 +240,7 @@ def test_law_with_vector_arithmetic_is_certified():
 def test_force_without_derivative_on_the_curve_is_unknown():
     found = stability(lambda hand: (0, 0, -300.0 * np.sqrt(hand.p[2] ** 2)))
     assert found.verdict == "unknown"
-    assert "bends where nothing is compared" in found.reason
+    assert "has a kink without a comparison" in found.reason
 
 
 def test_all_feasible_branches_become_cases_up_to_a_limit():
@@ -310,7 +310,7 @@ def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
         queue.append(hand.p[2])
         return 0.0, 0.0, -k * queue.pop(0)
 
-    sim, message = simulation(delayed), "another force when it is asked again|keeps numbers of the hand between calls"
+    sim, message = simulation(delayed), "another force when called again|keeps numbers of the hand between calls"
     for _ in range(2):
         found = hvf.certify(sim).stability
         assert found.verdict == "unknown"

@@ -127,4 +127,4 @@ def test_law_of_time_orientation_or_switch_is_not_certified(law: hvf.Law, messag
 def test_moment_of_own_law_is_listed_as_an_assumption() -> None:
     stability = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + with_moment), NO_HANDS).stability
     assert stability.verdict == "certified"
-    assert any("moment on the stylus is not felt" in assumed for assumed in stability.assumptions)
+    assert any("moment on the stylus has no effect" in assumed for assumed in stability.assumptions)

@@ -220,5 +220,5 @@ def test_capture_certificate_lists_scaling_and_dropped_first_frame(rig, tmp_path
         line for line in assumed if line.startswith("lengths, and gravity with them, are scaled to the figure:")
     )
     assert "one unit becomes" in scaled
-    cut = "walker.bvh: left out: the first frame, a pose that is not of the motion"
+    cut = "walker.bvh: left out: the first frame, a pose that is not part of the motion"
     assert (cut in assumed) == (rig.leading == 1)

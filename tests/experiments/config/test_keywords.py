@@ -179,7 +179,7 @@ def test_messages_use_keywords_in_python_and_options_on_the_command_line(
 
 def test_run_remarks_name_keywords() -> None:
     turns = hvf.run(user="turn", figure="none", seconds=0.1)
-    assert any(remark.endswith("this map does not look at that; expressive does") for remark in turns.remarks)
+    assert any(remark.endswith("this map ignores its orientation; use expressive") for remark in turns.remarks)
     assert "--" not in str(turns)
 
 

@@ -80,7 +80,7 @@ def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> N
         return 0
 
     stderr = stderr_of_interrupted(words, lambda: stored_trials() > 0, wait=0.0)
-    assert "the same command goes on" in stderr
+    assert "the same command resumes" in stderr
     assert str(tmp_path / "study") in stderr
     before = stored_trials()
     assert 0 < before < 96

@@ -14,6 +14,6 @@ def test_long_run_is_announced_with_time_and_disk_space(tmp_path: Path, monkeypa
     announcement = estimates.cost_estimate(tmp_path, 86400.0 / 24, groups)
     assert announcement is not None
     assert announcement.startswith(
-        "3600 s of simulated time take about 15 minutes at the pace of the last run, and 2.88 GB of"
+        "3600 s of simulated time take about 15 minutes at the speed of the last run, and 2.88 GB of"
     )
     assert estimates.cost_estimate(tmp_path, 10.0, groups) is None

@@ -102,11 +102,11 @@ def test_file_of_another_content_is_refused(tmp_path):
     with pytest.raises(SimError, match=r"other\.npz: holds a RiverBundle; expected a map: one of Cylindrical, Comp"):
         load_map(path)
     np.savez(path, a=np.zeros(3))
-    with pytest.raises(SimError, match="is no file of a map"):
+    with pytest.raises(SimError, match="is not a map file"):
         load_map(path)
     np.save(path.with_suffix(".npy"), np.zeros(3))
     path.with_suffix(".npy").rename(path)
-    with pytest.raises(SimError, match="is no file of a map"):
+    with pytest.raises(SimError, match="is not a map file"):
         load_map(path)
     what = r"missing\.npz: cannot be read \(No such file or directory\); expected the \.npz file of a map"
     with pytest.raises(SimError, match=what):
@@ -203,5 +203,5 @@ def test_non_map_file_is_refused_without_mentioning_pickle(
     else:
         path.write_bytes(random.Random(1).randbytes(3000) if content == "noise" else b"hello")
     stderr = refused(["run", "--map", str(path), "--out", str(tmp_path / "run")], capsys)
-    assert stderr.endswith("is no file of a map, or damaged; expected what hvf lift writes\n")
+    assert stderr.endswith("is not a map file, or damaged; expected what hvf lift writes\n")
     assert "pickle" not in stderr

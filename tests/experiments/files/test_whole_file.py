@@ -80,5 +80,5 @@ def test_interrupted_lift_leaves_no_file(
     with pytest.raises(KeyboardInterrupt):
         lift_file.lift_into(["walk"], tmp_path / "maps" / "map.npz")
     assert main(["lift", "walk", "--out", str(tmp_path / "map.npz")]) == 130
-    assert capsys.readouterr().err.strip() == "hvf: stopped; nothing is left half done"
+    assert capsys.readouterr().err.strip() == "hvf: stopped; no partial files are left"
     assert not list(tmp_path.iterdir())

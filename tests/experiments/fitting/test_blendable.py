@@ -52,7 +52,7 @@ def test_map_remarks_name_flying_and_off_pace_clips() -> None:
     config = run_config(map="composite", mode="follow", clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
     flies, paced = map_parts(config, figure_model()).remarks
     assert flies.startswith("jump flies for 0.")
-    assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its own pace")
+    assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its recorded speed")
 
 
 @pytest.mark.parametrize(

@@ -86,10 +86,10 @@ def test_unbearable_map_is_reported_with_the_best_legs(
     set_verdicts(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
-    assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best that is found at this lap",)
+    assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best found at this lap",)
     set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, NEVER)}, set())
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
-        "the physical figure lacks 14 % of weight with the legs of walk"
+        "the physical figure has a residual of 14 % of weight with the legs of walk"
     )
 
 

@@ -68,7 +68,8 @@ WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
-            1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s") + ", and lacks 20 % of weight with what it bears best",),
+            1, 0.5, (f"{WHOLE_MAP_REMARK.format('falls at 3.0 s')}, and has a residual of 20 % of weight "
+                     "with the best part of it",),
         ),
     ],
 )  # fmt: skip

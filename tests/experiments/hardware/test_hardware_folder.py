@@ -37,7 +37,8 @@ def record(out: Path, ticks: int) -> None:
 
 def interrupted_run(out: Path, ticks: int | None, overwrite: bool = False, damaged: bool = False) -> None:
     """A run that Ctrl-C ends, with a recording of so many ticks; None: before it has one."""
-    with run_folder(options(out, overwrite)):
+    with run_folder(options(out, overwrite)) as begin:
+        begin()
         if ticks is not None:
             record(out, ticks)
         if damaged:
@@ -46,7 +47,8 @@ def interrupted_run(out: Path, ticks: int | None, overwrite: bool = False, damag
 
 
 def test_concurrent_run_into_the_folder_is_refused(tmp_path: Path) -> None:
-    with run_folder(options(tmp_path)):
+    with run_folder(options(tmp_path)) as begin:
+        begin()
         record(tmp_path, 3)
         with pytest.raises(SimError, match="another run is being written into it"):
             check_folder(tmp_path, overwrite=True)
@@ -57,6 +59,18 @@ def test_concurrent_run_into_the_folder_is_refused(tmp_path: Path) -> None:
             pass
     assert holds_ticks(tmp_path / "run.h5")
     check_folder(tmp_path, overwrite=True)
+
+
+def test_earlier_run_survives_until_the_new_one_begins(tmp_path: Path) -> None:
+    record(tmp_path, 3)
+    earlier = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    with run_folder(options(tmp_path, overwrite=True)):
+        (tmp_path / "run.h5.new").write_bytes(b"refused before it began")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == earlier
+    with run_folder(options(tmp_path, overwrite=True)) as begin:
+        (tmp_path / "run.h5.new").write_bytes(b"begun")
+        begin()
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"begun"]
 
 
 @pytest.mark.parametrize("ticks", [None, 0])
@@ -92,7 +106,7 @@ def test_outcome_of_killed_servo_marks_unknown_values(tmp_path: Path, ticks: int
     last = RunStatus(False, State.ACTIVE, Fault.NONE, 0.0, row, None)
     outcome = outcome_of(tmp_path / "run.h5", ready, None, last)
     text = "\n".join(outcome.lines())
-    assert "the servo was gone before it told how long they took" in text
-    assert "By how much the servo grew is not known" in text
+    assert "their durations and lateness are unknown" in text
+    assert "The servo's growth is unknown" in text
     values = outcome.to_json()
     assert [values[name] for name in ("compute", "lateness", "memory_growth", "descriptors")] == [None] * 4

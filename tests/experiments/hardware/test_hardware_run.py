@@ -36,7 +36,7 @@ from experiments.files.device_files import (
     save_device,
 )
 from experiments.files.json_text import json_text
-from experiments.hardware.arming_checks import DEFAULT_HAND_PUSH, check_device, verified
+from experiments.hardware.arming_checks import DEFAULT_HAND_PUSH, check_device, ignored_options, verified
 from experiments.hardware.calibrate import Fixture, still_readings
 from experiments.setups.parts.defaults import resolved
 from models.world.scene import SceneConfig
@@ -105,6 +105,20 @@ def test_excessive_silence_limit_is_refused(tmp_path: Path, capsys) -> None:
     assert "--silence is 2e+06; expected at most 5000 periods" in stderr
 
 
+@pytest.mark.parametrize("late", ["-1", "0", "nan", "inf", "1e6"])
+def test_meaningless_lateness_limit_is_refused_by_name(tmp_path: Path, capsys, late) -> None:
+    assert "--late is " in refused(capsys, "run", "--arm", "--late", late, "--out", str(tmp_path / "run"))
+
+
+def test_simulated_hand_and_figure_of_a_file_are_named_as_ignored() -> None:
+    assert ignored_options(run_config(wave=0.02)) == []
+    assert ignored_options(run_config(mode="lead")) == []
+    simulated = run_config(user="push", person="median", figure="kinematic", stature=1.6)
+    assert ignored_options(simulated) == ["--user", "--person", "--figure"]
+    assert ignored_options(run_config(residual_force=0.4)) == ["--residual-force"]
+    assert ignored_options(run_config(mass=60.0)) == ["--mass"]
+
+
 def test_folder_with_a_run_is_kept_without_overwrite(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
     assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
@@ -139,7 +153,7 @@ def test_unknown_or_smaller_delay_certificate_does_not_arm(tmp_path: Path, monke
 def test_device_without_motors_or_calibration_is_refused() -> None:
     assert check_device(KNOWN, None) == []
     assert "no watchdog" in check_device(KNOWN._replace(watchdog=False), None)[0]
-    assert "no Phantom by build" in check_device(KNOWN._replace(own_weight=True), None)[0]
+    assert "is not a Phantom" in check_device(KNOWN._replace(own_weight=True), None)[0]
     assert check_device(KNOWN._replace(own_weight=True), None, identified=True) == []
     with pytest.raises(SimError, match="not calibrated"):
         check_device(KNOWN._replace(calibrated=False), None)

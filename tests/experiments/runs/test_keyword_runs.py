@@ -53,7 +53,7 @@ def test_recorded_keyword_run_is_reproduced_and_changed_from_its_folder(tmp_path
 
 def test_run_has_remarks_on_unsuitable_clips() -> None:
     run = hvf.run(**KEYWORDS | {"lap": 1.0, "clips": ["walk", "angry"]})
-    assert any("times its own pace" in remark for remark in run.remarks)
+    assert any("times its recorded speed" in remark for remark in run.remarks)
     assert str(run).startswith(run.remarks[0])
 
 

@@ -101,7 +101,7 @@ def wired(folder: Path, **parts: Any) -> None:
         (lambda run: wired(run, user=User(does="push")), "a replayed hand has no simulated user"),
         (lambda run: wired(run, user=User(person=hvf.persona("median"))), "a replayed hand has no simulated user"),
         (lambda run: simulation(follow(300.0), user=hvf.User(traces=CURVE), **device(run)), "has no simulated user"),
-        (lambda run: run_config(mode="stretch-then-follow", replay=str(run)), "does not tell when; expected another"),
+        (lambda run: run_config(mode="stretch-then-follow", replay=str(run)), "does not determine when; expected"),
         (lambda run: run_config(replay=str(run), cutoff=100.0), "--cutoff has no meaning with .* it belongs to the "
          "Phantom, without --replay"),
         (lambda run: hvf.certify(simulation(follow(300.0), **device(run))), "replayed and feels no force; expected a "

@@ -61,7 +61,7 @@ def test_convert_of_an_invalid_file_writes_nothing(tmp_path):
 def test_convert_refuses_targets_that_cannot_be_written(figure_file, tmp_path):
     with pytest.raises(ModelError, match=r"only BVH can be written; expected a name that ends in \.bvh"):
         convert(figure_file, tmp_path / "out.fbx")
-    with pytest.raises(ModelError, match="No such file or directory; expected a place that can be written"):
+    with pytest.raises(ModelError, match="No such file or directory; expected a writable path"):
         convert(figure_file, tmp_path / "nowhere" / "out.bvh")
 
 

@@ -24,6 +24,7 @@ from sim.devices.hidapi_node import HidapiNode
 from sim.hardware.emulated_process import EmulatedDriver
 from sim.hardware.gated_servo import ROW_SIZE, Ticker
 from sim.hardware.servo_process import (
+    DETAIL_SIZE,
     ORDER_BEAT,
     ORDER_NUMBER,
     ORDER_REQUEST,
@@ -125,7 +126,9 @@ class CountedServo(ServoProcess):
         self.heap.heap_open.restype = self.heap.heap_close.restype = None
         self.heap.heap_calls.restype = ctypes.c_long
         clock = ServoClock(late=60.0, heartbeat=60.0, realtime=False)
-        super().__init__(self.ticker, Channels(self.orders, self.status, self.rows, reports), clock)
+        super().__init__(
+            self.ticker, Channels(self.orders, self.status, self.rows, SharedNumbers(DETAIL_SIZE), reports), clock
+        )
 
     def turn(self, number: float, late: float) -> bool:
         self.heap.heap_close()

@@ -90,6 +90,21 @@ def test_driver_fault_is_latched(fault: Fault, value: float, operation: str) -> 
     assert_fault_releases(operation, (fault, value), fault)
 
 
+def test_message_of_the_device_on_its_fault_is_kept_until_it_is_cleared() -> None:
+    driver = gated_servo(**UNRAMPED_GATE).driver
+    assert isinstance(driver, EmulatedPhantom)
+    faulty = FaultyDriver(driver)
+    ticker = Ticker(gated_servo(faulty, **UNRAMPED_GATE))
+    faulty.read_fault = Fault.DEVICE_REPORTED, 0.0, "mine.py:3: ValueError: bad"
+    run(ticker, 2)
+    faulty.read_fault = Fault.DEVICE_REPORTED, 0.0, "mine.py:4: ValueError: worse"
+    run(ticker, 2, 2)
+    assert ticker.detail == "mine.py:3: ValueError: bad"
+    faulty.read_fault = None
+    run(ticker, 2, 4, CLEAR)
+    assert ticker.detail == ""
+
+
 @pytest.mark.parametrize("periods", [5, 50, 500])
 def test_stall_of_five_periods_or_more_is_a_fault(periods: int) -> None:
     assert_fault_releases("silent", periods, Fault.READING_STALE, within=8)

@@ -30,7 +30,13 @@ from sim.hardware.recorder_process import RecordingJob, record_rows
 from sim.hardware.servo_process import Ended, ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
-from tests.sim.hardware.process_factories import PERIOD, emulated_device, servo_over_packets, servo_with_own_device
+from tests.sim.hardware.process_factories import (
+    PERIOD,
+    emulated_device,
+    servo_over_packets,
+    servo_with_failing_device,
+    servo_with_own_device,
+)
 
 LENIENT_CLOCK = ServoClock(late=20.0, heartbeat=20.0)
 """Limits so long that a busy machine causes no fault; tests of lateness or silence set their own."""
@@ -181,6 +187,14 @@ def record_with_size_limit(size: int, *arguments) -> None:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
     record_rows(*arguments)
+
+
+@pytest.mark.processes
+def test_message_of_a_failing_device_is_in_the_fault_text() -> None:
+    with HardwareRun(servo_with_failing_device, PERIOD, LENIENT_CLOCK) as run:
+        run.start()
+        status = wait_until(run, lambda status: bool(status.detail))
+    assert status.fault_text == "the device reported error 0 (mine.py:3: ValueError: bad)"
 
 
 @pytest.mark.processes

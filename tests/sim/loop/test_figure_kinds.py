@@ -88,7 +88,7 @@ def test_fault_is_recorded_and_reported_first_in_the_summary(tmp_path: Path) -> 
     session = session_of("none")
     session.servo.field.limiter[0] = np.nan
     summary = record(session, tmp_path, to_dict(session.config), 1.0, time.perf_counter(), Console(quiet=True))
-    assert summary.lines()[0] == "The device let go at 0.000 s: the limiter's memory held nan."
+    assert summary.lines()[0] == "The motors were switched off at 0.000 s: the limiter's memory held nan."
     with Recording(tmp_path / "run.h5") as recording:
         assert (recording.channel("ticks", "fault")[:] == 2.0).all()
         assert recording.summary is not None

@@ -130,9 +130,9 @@ def test_bent_curve_is_saved_loaded_and_drawn(stretch_run, tmp_path) -> None:
 def test_file_without_a_curve_is_refused(text: str, tmp_path) -> None:
     path = tmp_path / CURVE_FILE
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(SimError, match=r"curve\.json: no curve"):
+    with pytest.raises(SimError, match=r"curve\.json: not a curve"):
         load_curve(path)
-    with pytest.raises(SimError, match="no curve"):
+    with pytest.raises(SimError, match="not a curve"):
         load_curve(tmp_path / "missing.json")
 
 

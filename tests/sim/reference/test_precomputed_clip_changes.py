@@ -150,10 +150,13 @@ def test_common_stride_count_of_two_clips_is_found(map_with_offsets: RiverClips)
     ("verdict", "remarks"),
     [
         (Verdict(0.05, np.inf), ()),
-        (Verdict(0.2, np.inf), ("from river to river the physical figure lacks 20 % of weight",)),
+        (Verdict(0.2, np.inf), ("from river to river the physical figure has a residual of 20 % of weight",)),
         (
             Verdict(0.2, 6.5),
-            ("from river to river the physical figure falls at 6.5 s, 1.0 s after squat_dance gives way to walk",),
+            (
+                "from river to river the physical figure falls at 6.5 s, "
+                "1.0 s after the change from squat_dance to walk",
+            ),
         ),
         (Verdict(0.2, 2.0), ("from river to river the physical figure falls at 2.0 s, before any river changes",)),
     ],

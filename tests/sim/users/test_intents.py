@@ -193,7 +193,7 @@ def test_error_of_an_own_intent_names_its_cause() -> None:
         return "up"
 
     person = Participant(wishes=Own(nothing).wishes(CIRCLE, 1.0, 1), own=Own(nothing)).holding(1e-3, 1e-4)
-    with pytest.raises(SimError, match="expected a place"):
+    with pytest.raises(SimError, match="expected a position"):
         Own(nothing).ask(person, 0.0)
     with pytest.raises(SimError, match="cannot be compiled"):
         Own(lambda t, place, force, rows: unknown(t), compiled=True).address()  # noqa: F821 # pyright: ignore

@@ -326,7 +326,7 @@ def cut_short():
         (lambda: lifted_at([]), "no clips to lift"),
         (lambda: lifted_at([motion(swinging(1)[:1], "one")]), "clip 'one': a clip needs at least 2 frames, got 1"),
         (lambda: lifted_at([motion(swinging(1)[:3], "few", closed=False)]), "'few' has 3 frames, and a curve needs 4"),
-        (lambda: lifted_at([motion(cut_short(), "cut")]), "'cut' is said to be cyclic.*lift it as an open"),
+        (lambda: lifted_at([motion(cut_short(), "cut")]), "'cut' is given as cyclic.*lift it as an open"),
         (lambda: lifted_at([FOUR[0], FOUR[1]], Room(separation=0.2)), "2 clips do not fit 200 mm apart .* 1 do"),
         (lambda: lifted_at([FOUR[0]] * 120, Room(separation=0.008)), r"120 clips do not fit.*separation of \d\.\d mm"),
         (lambda: lifted_at([motion(swinging(1), "fast", fps=3000.0)]), "'fast' goes round in 0.04 s.*slow it down to"),

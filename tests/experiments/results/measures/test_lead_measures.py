@@ -186,7 +186,8 @@ def test_lead_summary_lines() -> None:
     assert summary.lines() == [
         "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
         "by up to 1.5 cm, the physical figure's by up to 2.5 cm.",
-        "Back it retraced its way within 0.20 cm and 0.10°, the physical figure within 2.0 cm and 1.0°. The hand felt "
+        "On the way back it retraced its path within 0.20 cm and 0.10°, the physical figure within 2.0 cm and 1.0°. "
+        "The hand felt "
         "up to 1.1 N.",
     ]
     never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, None, None, None, None)

@@ -110,7 +110,7 @@ def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) 
     assert len(summary.lines()) == 9
     assert summary.path.pace == pytest.approx(1.2 / 1.5)
     assert summary.path.stopped_at is None
-    assert "held the field back at 100 ticks" in summary.lines()[0]
+    assert "reduced the force at 100 ticks" in summary.lines()[0]
 
 
 @pytest.mark.parametrize("block", [1, 7, 113, 205])

@@ -31,6 +31,7 @@ def test_oscillating_loop_is_reported_with_frequency_and_growth():
     assert found.frequency == pytest.approx(120.0, rel=0.05)
     assert found.growth == pytest.approx(8.0, rel=0.3)
     assert "It oscillates" in found.lines()[0]
+    assert f"the force by up to {found.force_max:.1f} N, the stylus by {found.motion_rms_mm:.2f} mm" in found.lines()[0]
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def test_distance_between_places_is_measured_and_large_ones_are_reported(wanderi
     near, far = (MapTransition(0, 1, float(angles[k]), 0.1, 0.1) for k in (distances.argmin(), distances.argmax()))
     assert carried_over(haptic_map, near)[1] == ()
     (remark,) = carried_over(haptic_map, far)[1]
-    assert remark.startswith("where squat_dance and to_and_fro agree, their places over the floor are 0.")
+    assert remark.startswith("where squat_dance and to_and_fro agree, their positions on the floor are 0.")
 
 
 @pytest.mark.parametrize(("user", "figure", "warnings"), [("push", "physical", 1), ("relaxed", "physical", 0)])

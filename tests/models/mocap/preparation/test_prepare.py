@@ -360,7 +360,7 @@ def test_preparation_makes_a_captured_cartwheel_feasible_on_feet_and_hands(mocap
     assert outcome.made.hands.moved < 0.12
     assert outcome.measures.residual < 0.05
     assert outcome.followed.stands
-    assert "hands bear load for" in summary(outcome)
+    assert "hands are loaded for" in summary(outcome)
 
 
 @pytest.mark.slow
@@ -419,7 +419,7 @@ def test_prepare_command_prints_missing_joints_and_dropped_frames(tmp_path, caps
     assert main(["prepare", str(tmp_path / "r.bvh"), str(tmp_path / "out.bvh")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "missing: left_clavicle (follows chest), right_clavicle (follows chest)"
-    assert lines[1] == "left out: the first frame, a pose that is not of the motion"
+    assert lines[1] == "left out: the first frame, a pose that is not part of the motion"
     assert lines[-1].startswith("r: ")
 
 

@@ -138,7 +138,7 @@ MALFORMED = {
         "long text line": (BVH.replace("MOTION", "MOTION" + " " * 2_000_000), "x.bvh:19: line of 2000007 bytes"),
         "control characters": ("\x1b[31mHIERARCHY\n", "x.bvh:1: file begins with"),
         "no length": (BVH.replace("-4", "0"), "x.bvh: the legs have no length"),
-        "one leg": (BVH.replace("RightLeg", "Tail"), "x.bvh:1: no joint is taken for the right_shank"),
+        "one leg": (BVH.replace("RightLeg", "Tail"), "x.bvh:1: no joint was found for the right_shank"),
     },
     "ASF": {
         "no bones": (":version 1.10\n", "1.asf: 'every bone' is not in the hierarchy"),

@@ -266,7 +266,7 @@ def test_amc_bone_without_values_is_not_rotated_and_remarked(tmp_path):
     amc = AMC.format(mode="DEGREES", root="1 2 3 40 50 60", thigh="15 -25").replace("thigh 15 -25\n", "")
     motion = read_acclaim(tmp_path, asf, amc)
     np.testing.assert_allclose(motion.rotations[:, 1], [[1, 0, 0, 0]] * 2, atol=1e-12)
-    assert motion.remarks == ("'thigh' has no values in any frame: it is taken as not turned",)
+    assert motion.remarks == ("'thigh' has no values in any frame: it is taken as unrotated",)
 
 
 def deepmimic_row(duration, x, turn):

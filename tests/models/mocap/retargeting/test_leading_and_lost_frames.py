@@ -266,7 +266,7 @@ def test_frame_time_too_long_for_a_camera_is_remarked_and_not_prepared(walk_rows
     assert not any("a frame lasts" in line for line in load(tmp_path / "r.bvh").report.remarks)
     for seconds, shown in (("0.5", "0.5"), ("33.3333", "33")):
         (tmp_path / "r.bvh").write_text(re.sub(r"Frame Time: \S+", f"Frame Time: {seconds}", text))
-        shown = f"a frame lasts {shown} s, longer than a camera's: if that is not so, state its --frame-rate"
+        shown = f"a frame lasts {shown} s, longer than a camera's: if that is wrong, give --frame-rate"
         assert shown in load(tmp_path / "r.bvh").report.remarks
     with pytest.raises(ModelError, match=r"since a frame lasts 33 s; expected a Frame Time in seconds, such as"):
         prepared(tmp_path / "r.bvh")

@@ -268,7 +268,7 @@ def test_rest_pose_with_hanging_arms_keeps_them_hanging(mocap, model):
 
 def test_skeleton_without_legs_is_refused(mocap):
     with pytest.raises(
-        MotionFileError, match=r"sinusoidal.bvh:1: no joint is taken for the left_thigh \(among base, ch"
+        MotionFileError, match=r"sinusoidal.bvh:1: no joint was found for the left_thigh \(among base, ch"
     ):
         load(mocap / "quirks/fairmotion_sinusoidal.bvh")
 
@@ -285,7 +285,7 @@ def test_joints_moved_by_positions_alone_are_refused(mocap, tmp_path):
         load(tmp_path / "positions.bvh")
 
 
-NON_HUMAN_LEGS = "which are no human's: the file's unit is another"
+NON_HUMAN_LEGS = "which is not human: the file's unit is another"
 
 
 @pytest.mark.parametrize(("length", "human"), [("0.45", True), ("0.01", False), ("45", False), ("1", True)])
@@ -294,7 +294,7 @@ def test_unit_of_the_format_is_doubted_if_it_gives_legs_of_no_human(tmp_path, le
     (tmp_path / "1_1.amc").write_text(AMC)
     report = load(tmp_path / "1_1.amc").report
     assert report is not None
-    assert "(the format says so), legs" in report.unit
+    assert "(fixed by the format), legs" in report.unit
     assert (NON_HUMAN_LEGS in report.unit) != human
 
 

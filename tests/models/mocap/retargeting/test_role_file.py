@@ -37,7 +37,7 @@ def write_role_file(roles, tmp_path):
 
 def test_role_file_gives_the_same_motion_as_joint_names(named_and_numbered, tmp_path):
     named, bare, roles = named_and_numbered
-    with pytest.raises(MotionFileError, match=r"no joint is taken for the left_thigh \(among .*--roles FILE"):
+    with pytest.raises(MotionFileError, match=r"no joint was found for the left_thigh \(among .*--roles FILE"):
         load(bare)
     by_roles = load(bare, Hints(roles=write_role_file(roles, tmp_path))).clip
     np.testing.assert_allclose(by_roles.poses, load(named).clip.poses, atol=1e-12)
