@@ -21,8 +21,8 @@ from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import Loop
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
 

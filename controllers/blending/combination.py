@@ -20,9 +20,9 @@ from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation
-from controllers.rotations import multiply, relative
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
+from geometry.rotations import multiply, relative
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
 _PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weights

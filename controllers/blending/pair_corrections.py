@@ -15,8 +15,8 @@ from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 _TERMS = 3  # terms of the polynomial, and mixtures of each pair that are interpolated exactly
 _ROUNDING = 1e-9  # [m]

@@ -4,9 +4,9 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, PIECE, find_piece, wrap_phase
-from controllers.rotations import multiply
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import multiply
 
 _Quat = tuple[float, float, float, float]
 

@@ -11,7 +11,7 @@ from numba import njit
 from controllers.checks import check_field_types, check_kind, checked, numbers_of
 from controllers.curves.bounds import capsule_tree
 from controllers.errors import CurveError
-from controllers.state import Array
+from geometry.arrays import Array
 
 # The packed curve: a header, then three blocks; every offset counts from the start of the header.
 SIZE, PIECES, PERIODIC, START, END, LEVELS, BREAKS, COEFFICIENTS, TREE, HEADER = range(10)

@@ -32,8 +32,6 @@ from controllers.legs.skate_removal import with_planted_ends
 from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, rotate_about_vertical, rotate_in_plane, turn_of
-from controllers.rotations import multiply, relative
-from controllers.state import Array, Mask
 from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,
@@ -45,6 +43,8 @@ from controllers.walking.walked_path import (
     straight_path,
 )
 from controllers.work_array import work_array
+from geometry.arrays import Array, Mask
+from geometry.rotations import multiply, relative
 
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 

@@ -29,8 +29,8 @@ from controllers.legs.stance_hold import packed_soles
 from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
 from controllers.saturation import soft_clamp
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
+from geometry.arrays import Array, IntArray
 
 _LAG_SAMPLES = 128  # samples of λ round the lap
 _MAX_ROWS = 256  # largest number of rows of the corrections' table round the lap

@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.easing import smooth_steps
 from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, lowest_point
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.sole_heights import STANCE_HEIGHT, SWING_HEIGHT
 from controllers.motion.channels import with_continuous_signs
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 
 CATCH_UP = 8.0
 """Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends

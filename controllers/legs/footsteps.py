@@ -20,14 +20,15 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.legs.limbs import CENTRE, FIRST, LIMB_SIZE, OFFSETS, Limb
 from controllers.legs.stance_hold import packed_soles
 from controllers.motion.inertialization import decaying_offset, stopping_distance
-from controllers.motion.vectors import Vector, vector_at
-from controllers.rotations import exponential, logarithm, multiply, relative, rotate
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
+from geometry.rotations import exponential, logarithm, multiply, relative, rotate
+from geometry.vectors import Vector, vector_at
 
 MAX_CONTINUED_ACCELERATION = 20.0
 """Largest linear acceleration of the old motion that is continued in a change, of the root and of feet [m/s²]: a hand

@@ -14,7 +14,7 @@ from controllers.errors import ParameterError
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.motion.channels import with_continuous_signs
 from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array
+from geometry.arrays import Array
 
 SOFTMIN_WIDTH = 5e-4
 """Softness of the minimum of sole heights when feet are planted or the ground is estimated [m]: four points at equal

@@ -23,7 +23,9 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.joint_limits import saturate_joint
-from controllers.motion.vectors import (
+from controllers.state import Vec3
+from geometry.arrays import Array
+from geometry.vectors import (
     Vector,
     cross,
     dot,
@@ -36,7 +38,6 @@ from controllers.motion.vectors import (
     turned_back,
     vector_at,
 )
-from controllers.state import Array, Vec3
 
 # A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
 # points, limits (3, 3, 2); for a limb that steps, the points of its sole follow (`footsteps`).

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.motion.channels import signed_like
-from controllers.state import Array
+from geometry.arrays import Array
 
 # Largest extension of a limb over its length. A led knee that gets straighter stops with 2500 rad/s², beyond its motor.
 # Knees of eight led captures accelerate by up to 1040 rad/s²; with 0.98 by 810, with the root 0.8 cm lower; with 0.998

@@ -23,7 +23,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.curves.splines import periodic_interpolation
-from controllers.easing import smooth_steps
 from controllers.legs.cyclic_runs import runs
 from controllers.legs.footfalls import CATCH_UP, accumulated_slip
 from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, end_channels, lowest_point
@@ -31,7 +30,8 @@ from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.reaching import shortfall, solve_reach
 from controllers.motion.channels import signed_like
 from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
+from geometry.easing import smooth_steps
 
 # Fraction of a swing at each end over which g rises. Half of it, or half a swing, changes the foot slide of eight led
 # captures (in the animation) by at most 0.3 cm, and does not change their knees.

@@ -21,13 +21,14 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
 from controllers.legs.sole_heights import STANCE_HEIGHT
-from controllers.rotations import multiply, rotate
-from controllers.state import Array, Quat
+from controllers.state import Quat
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
+from geometry.rotations import multiply, rotate
 
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
 # 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 def with_continuous_signs(quaternions: Array) -> Array:

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
 from controllers.motion.channels import normalise, with_continuous_signs
-from controllers.state import Array
+from geometry.arrays import Array
 
 # [m], [rad] a lap that ends nearer to its start has no drift
 _MAX_STILL_LENGTH, _MAX_STILL_ANGLE = 0.02, np.deg2rad(2.0)

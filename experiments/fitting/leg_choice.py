@@ -15,13 +15,13 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.state import Array
 from experiments.files.array_cache import cached_array
 from experiments.fitting.similarity import MAX_FOOT_SKATE, motion_of
 from experiments.fitting.verdict import FPS, MAX_RESIDUAL, SECONDS, Verdict, cached_verdict
+from geometry.arrays import Array
+from geometry.easing import cubic_steps
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from sim.compilation.sources import results_folder

@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.fitting.leg_choice import GOOD_RESIDUAL, PUSH_INTERVAL, SHARES, is_sound, push_profile
 from experiments.fitting.verdict import FPS, SECONDS, Verdict, cached_verdict
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 

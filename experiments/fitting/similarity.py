@@ -13,8 +13,8 @@ import numpy as np
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
-from controllers.state import Array
 from experiments.files.array_cache import cached_array
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import results_folder

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
 from experiments.console.progress import working
 from experiments.files.array_cache import cached_array
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from sim.compilation.sources import results_folder

@@ -23,11 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.state import Array
 from experiments.results.measures.pose_distance import segment_places
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.library import read_motion
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.fidelity import common_frames
 from models.mocap.preparation.prepare import Prepared

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 

@@ -24,8 +24,8 @@ from controllers.state import (
     HAND_SWITCH,
     HAND_TIME,
     HAND_VELOCITY,
-    Array,
 )
+from geometry.arrays import Array
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,

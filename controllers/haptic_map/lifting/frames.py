@@ -17,7 +17,6 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.motion.channels import closing_signs, normalise, signed_like
 from controllers.motion.loops import (
@@ -28,7 +27,8 @@ from controllers.motion.loops import (
     rotate_about_vertical,
     rotate_in_plane,
 )
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 
 CLOSES = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
 LEAST_GAP = 0.05  # [rad] least gap that an open clip must leave in the lap

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
 from controllers.motion.loops import checked_clip
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)

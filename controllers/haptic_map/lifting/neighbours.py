@@ -22,8 +22,8 @@ from scipy.spatial import KDTree
 
 from controllers.curves.splines import basis, basis_slope, control_points
 from controllers.haptic_map.lifting.cores import core_points
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 SITE = 4  # channels of a site: r, z, R, and the core b
 

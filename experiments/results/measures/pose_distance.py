@@ -3,9 +3,9 @@ r"""Distances between poses of two animations: geodesic in D = R³ × SO(3)^18, 
 import mujoco
 import numpy as np
 
-from controllers.state import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, SEGMENTS
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import global_rotations, pose_difference
 
 METRE = 1.0  # [rad/m] weight of the root's displacement in the product metric

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from controllers.legs.sole_heights import STANCE_HEIGHT
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.world.scene import SceneConfig
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.gravity import GRAVITY
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.authoring.authoring import Choreography, poses_at
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, figure_model
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import global_rotations
 
 _MAX_REACH_RATIO = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°

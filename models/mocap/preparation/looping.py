@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, figure_model
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 
 # Cut-off of the low-pass [Hz]; with 6 and 15 Hz the residuals of eight captures are the same to 2 percentage points.

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array, Mask
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles

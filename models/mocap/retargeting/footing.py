@@ -11,9 +11,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array, IntArray, Mask
+from geometry import quaternions
+from geometry.arrays import Array, IntArray, Mask
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, SEGMENTS, figure_model, soles
-from models.mocap.motion import quaternions
 
 # Largest height difference among the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.
 _MAX_SOLE_RANGE = 0.06

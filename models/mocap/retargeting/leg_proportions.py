@@ -15,9 +15,9 @@ time, so that flights remain parabolas.
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, figure_model
-from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES
 
 # Half or twice the first and the last of these moves the hips of ten captures by at most 2 mm; the second, 5 and 16 mm.

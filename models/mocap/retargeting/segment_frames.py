@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.retargeting.body_lines import unit
 
 

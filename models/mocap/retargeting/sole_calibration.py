@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
 from models.mocap.retargeting.segment_frames import with_constant_offset
 

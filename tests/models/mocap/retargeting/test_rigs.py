@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
 from models.mocap.library import embedded, embedded_names, load
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.poses import sole_points
 from models.mocap.retargeting import abdomen, calibration, footing, retarget

@@ -2,8 +2,8 @@
 
 from numba import njit
 
-from controllers.rotations import multiply, rotate
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.rotations import multiply, rotate
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

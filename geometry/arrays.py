@@ -1,4 +1,4 @@
-"""Type aliases of arrays; `controllers.state` has its own, since neither package imports the other."""
+"""Type aliases of arrays."""
 
 from typing import TypeAlias
 

@@ -6,7 +6,7 @@ least 15 times as long for ten thousand.
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 
 
 def product(q: Array, r: Array) -> Array:
