@@ -5,13 +5,6 @@ import numpy as np
 from geometry.arrays import Array
 
 
-def with_continuous_signs(quaternions: Array) -> Array:
-    """The same rotations (n, ..., 4), each with the sign that is nearer to the one before it."""
-    dots = np.einsum("n...x,n...x->n...", quaternions[:-1], quaternions[1:])
-    signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[..., None]
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs])
-
-
 def signed_like(quaternions: Array, others: Array) -> Array:
     """The same rotations (..., 4), each with the sign that is nearer to the other one."""
     same = np.sum(quaternions * others, axis=-1, keepdims=True) >= 0.0

@@ -26,12 +26,13 @@ from scipy.interpolate import CubicSpline
 from experiments.results.measures.pose_distance import segment_places
 from geometry import quaternions
 from geometry.arrays import Array
+from geometry.quaternions import unit
 from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.library import read_motion
 from models.mocap.motion.clip import Clip, global_rotations
 from models.mocap.preparation.fidelity import common_frames
 from models.mocap.preparation.prepare import Prepared
-from models.mocap.retargeting.body_lines import SIDES, body_lines, unit
+from models.mocap.retargeting.body_lines import SIDES, body_lines
 from models.mocap.retargeting.retarget_report import RetargetReport
 from models.mocap.retargeting.skeleton_roles import roles_of
 

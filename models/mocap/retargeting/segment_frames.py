@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
 from geometry.arrays import Array
-from models.mocap.retargeting.body_lines import unit
+from geometry.quaternions import unit
 
 
 def frames(left: Array, along: Array) -> Array:
