@@ -7,12 +7,11 @@ from controllers.curves.trajectory import BREAKS, COEFFICIENTS, PIECE, find_piec
 from controllers.work_array import work_array
 from geometry.arrays import Array
 from geometry.rotations import multiply
-
-_Quat = tuple[float, float, float, float]
+from geometry.vectors import Quaternion, Vector
 
 
 @njit
-def curve_orientation(blob: Array, at: int, t: float) -> tuple[_Quat, tuple[float, float, float]]:
+def curve_orientation(blob: Array, at: int, t: float) -> tuple[Quaternion, Vector]:
     """Orientation R_H(t), unit quaternion wxyz, and its angular velocity ω_H [rad/s], of the curve at ``blob[at:]``.
 
     With s the spline through the quaternions, q = s/|s| and ω = 2 Im(ṡ ⊗ s*)/|s|². Where the phase of an open curve is
