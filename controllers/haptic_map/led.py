@@ -165,8 +165,8 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     for joint in range(1, rotations):
         at, spin = 3 + 4 * joint, spins[joint]
         for by, by_x, pace in ((1, change, 1.0), (0, slope, rate)):
-            x, y, z = unit_rotation(value[at : at + 4], by_x[at : at + 4], pace, q[joint])
-            spin[0, by], spin[1, by], spin[2, by] = x, y, z
+            turn = unit_rotation(value[at : at + 4], by_x[at : at + 4], pace, q[joint])
+            spin[0, by], spin[1, by], spin[2, by] = turn
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB_SIZE * i : _HEADER + LIMB_SIZE * (i + 1)]

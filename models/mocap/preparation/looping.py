@@ -207,7 +207,7 @@ def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) ->
     if before + after >= 6:
         for k in range(-before, after + 1):
             # 0 is the motion at the lap's end, 1 that at its start (or its mirror image), both at the same place.
-            fade = smooth_steps((k + before) / (before + after))
+            fade = smooth_steps(np.array((k + before) / (before + after)))
             end = inverse.moved(poses[last + k])
             mixed = add_tangents(end[None], fade * pose_difference(end, opening[first + k])[None])
             if k >= 0:
