@@ -34,8 +34,8 @@ test-processes: $(READY)
 test-python:
 	$(PYTHON) -m venv --clear build/python
 	build/python/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[study,video,gltf]'
-	build/python/bin/python -c 'import pkgutil, models, controllers, sim, experiments, hvf; \
-	    [__import__(module.name) for top in (models, controllers, sim, experiments) \
+	build/python/bin/python -c 'import pkgutil, geometry, models, controllers, sim, experiments, hvf; \
+	    [__import__(module.name) for top in (geometry, models, controllers, sim, experiments) \
 	        for module in pkgutil.walk_packages(top.__path__, top.__name__ + ".") if not module.name.endswith("__main__")]'
 	build/python/bin/hvf run --figure none --seconds 1 --out build/python/run --overwrite
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _NUMBER_KINDS: dict[object, tuple[type, str]] = {float: (Real, "a number"), int: (Integral, "a whole number")}
 _KIND_NAMES: dict[object, str] = {bool: "True or False", str: "text", types.NoneType: "None"}

@@ -9,8 +9,8 @@ f departs from the identity at a with f' = 1 and f'' = 0, and is constant, a + m
 import numpy as np
 from numba import njit
 
-from controllers.easing import cubic_step
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import cubic_step
 
 
 @njit

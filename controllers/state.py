@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-Array: TypeAlias = npt.NDArray[np.float64]
-IntArray: TypeAlias = npt.NDArray[np.int64]
-Mask: TypeAlias = npt.NDArray[np.bool_]
-Vec3: TypeAlias = npt.NDArray[np.float64]
-Quat: TypeAlias = npt.NDArray[np.float64]
-Pose: TypeAlias = npt.NDArray[np.float64]
-Tangent: TypeAlias = npt.NDArray[np.float64]
+from geometry.arrays import Array
+
+Vec3: TypeAlias = Array
+Quat: TypeAlias = Array
+Pose: TypeAlias = Array
+Tangent: TypeAlias = Array
 
 HAND_TIME = 0
 HAND_POSITION = 1

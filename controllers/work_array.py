@@ -13,7 +13,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 from numba.np.arrayobj import populate_array
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 
 def work_array(shape: int | tuple[int, ...]) -> Array:

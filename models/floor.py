@@ -2,7 +2,8 @@
 
 import mujoco
 
-FRICTION = 0.9  # μ of a sole on the floor, as of rubber on a dry one (models/humanoid/README.md)
+from geometry.physics import FRICTION
+
 _TORSIONAL_FRICTION, _ROLLING_FRICTION = 0.005, 0.0001  # [m], MuJoCo's defaults; contacts with condim 3 do not use them
 
 # MuJoCo's impratio: ratio of frictional to normal constraint impedance. Contacts are soft: with a ratio of 1, a loaded

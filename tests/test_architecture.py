@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("models", "controllers", "sim", "experiments", "tools")
+PACKAGES = ("geometry", "models", "controllers", "sim", "experiments", "tools")
 
 
 @cache

@@ -9,7 +9,7 @@ from controllers.legs.limb_ends import SOFTMIN_WIDTH, end_poses, lowest_point
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop
 from controllers.motion.time_warping import least_cost_lead, smooth_lead
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 MAX_LEAD = 0.125  # largest lead or lag of a warp, as a fraction of the lap
 

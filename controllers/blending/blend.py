@@ -16,35 +16,26 @@ from controllers.blending.combination import (
     packed_figure,
 )
 from controllers.borrowed import without_refcount
-from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.curves.splines import control_points, interpolate
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import Loop
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
 
 
 @njit(forceinline=True)
 def _interpolate(rows: Array, samples: int, clips: int, angle: float, value: Array, slope: Array) -> None:
-    """Channels of each clip and their derivatives by the angle, from uniform cubic B-splines."""
+    """Channels of each clip and their derivatives by the angle."""
     channels = value.shape[1]
-    s = angle * samples / (2.0 * np.pi)
+    s, rate = angle * samples / (2.0 * np.pi), samples / (2.0 * np.pi)
     row = min(int(s), samples - 1)
-    b0, b1, b2, b3 = basis(s - row)
-    d0, d1, d2, d3 = basis_slope(s - row)
-    rate = samples / (2.0 * np.pi)
-    stride = clips * channels
     for clip in range(clips):
-        first = row * stride + clip * channels
-        p0, p1 = rows[first : first + channels], rows[first + stride : first + stride + channels]
-        first += 2 * stride
-        p2, p3 = rows[first : first + channels], rows[first + stride : first + stride + channels]
-        for k in range(channels):
-            value[clip, k] = b0 * p0[k] + b1 * p1[k] + b2 * p2[k] + b3 * p3[k]
-            slope[clip, k] = rate * (d0 * p0[k] + d1 * p1[k] + d2 * p2[k] + d3 * p3[k])
+        first = (row * clips + clip) * channels
+        interpolate(rows[first:], clips * channels, s - row, rate, value[clip], slope[clip])
 
 
 @njit

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limbs: Sequence[Limb]) -> dict[str, Array]:

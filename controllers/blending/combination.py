@@ -20,9 +20,10 @@ from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation
-from controllers.rotations import multiply, relative
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
+from geometry.rotations import multiply
+from geometry.vectors import unit_rotation
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
 _PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weights
@@ -46,18 +47,6 @@ def figure_channels(figure: Array) -> int:
     return 3 + 4 * int(figure[_ROTATIONS]) + N_END_CHANNELS * int(figure[_LIMBS])
 
 
-@njit(forceinline=True)
-def _unit_rotations(value: Array, slope: Array, column: int, unit: Array, spin: Array) -> None:
-    """Quaternions of all clips at a column, normalised, and their local angular velocities 2 Im(q⁻¹ ⊗ ṡ)/|s|."""
-    for i in range(value.shape[0]):
-        q, d = value[i, column : column + 4], slope[i, column : column + 4]
-        scale = 1.0 / np.sqrt(max(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1e-12))
-        for j in range(4):
-            unit[i, j] = scale * q[j]
-        _, x, y, z = relative(unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3], d[0], d[1], d[2], d[3])
-        spin[i, 0], spin[i, 1], spin[i, 2] = 2.0 * scale * x, 2.0 * scale * y, 2.0 * scale * z
-
-
 @njit
 def _mean_position(value: Array, slope: Array, column: int, weights: Array, changes: Array, mean: Array) -> None:
     """Mean of three channels, rows: value, derivatives by θ and the two other parameters."""
@@ -77,8 +66,10 @@ def _mean_rotations(
     """Mean rotation of the root and each joint with the weights of its group, and its local angular velocities."""
     unit, spin = work_array((value.shape[0], 4)), work_array((value.shape[0], 3))
     for joint in range(q.shape[0]):
-        group = int(figure[_GROUPS + joint])
-        _unit_rotations(value, slope, 3 + 4 * joint, unit, spin)
+        group, at = int(figure[_GROUPS + joint]), 3 + 4 * joint
+        for i in range(value.shape[0]):
+            x, y, z = unit_rotation(value[i, at : at + 4], slope[i, at : at + 4], 1.0, unit[i])
+            spin[i, 0], spin[i, 1], spin[i, 2] = x, y, z
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])

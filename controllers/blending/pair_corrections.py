@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.curves.splines import control_points, interpolate
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 _TERMS = 3  # terms of the polynomial, and mixtures of each pair that are interpolated exactly
 _ROUNDING = 1e-9  # [m]
@@ -100,10 +100,9 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
     )  # fmt: skip
     scale = rows / (2.0 * np.pi)
     row = min(int(angle * scale), rows - 1)
-    b0, b1, b2, b3 = basis(angle * scale - row)
-    c0, c1, c2, c3 = basis_slope(angle * scale - row)
     stride = pairs * _TERMS * channels
     table, rates = _INDEX + total * total + row * stride, work_array(3)
+    term, term_slope = work_array(channels), work_array(channels)
     d[:] = 0.0
     for a in range(len(clips)):
         for b in range(len(clips)):
@@ -116,13 +115,11 @@ def pair_correction(numbers: Array, angle: float, clips: IntArray, w: Array, cha
                     rates[parameter] = (changes[parameter, a] * w[b] + w[a] * changes[parameter, b]) * power
                     rates[parameter] += product * slope * (changes[parameter, a] - changes[parameter, b])
                 first = table + (pair * _TERMS + k) * channels
+                interpolate(numbers[first:], stride, angle * scale - row, 1.0, term, term_slope)
                 for c in range(channels):
-                    p = first + c
-                    v0, v1, v2, v3 = numbers[p], numbers[p + stride], numbers[p + 2 * stride], numbers[p + 3 * stride]
-                    value = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
-                    d[0, c] += product * power * value
-                    d[1, c] += product * power * scale * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+                    d[0, c] += product * power * term[c]
+                    d[1, c] += product * power * scale * term_slope[c]
                     for parameter in range(3):
-                        d[1 + parameter, c] += rates[parameter] * value
+                        d[1 + parameter, c] += rates[parameter] * term[c]
                 slope = (k + 1) * power
                 power *= difference

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 NODE = 8  # numbers per node: start of the chord (3), chord (3), 1/|chord|², radius
 _UNREACHABLE = 1e150  # [m] position of nodes without a piece, so that they are always out of reach

@@ -13,8 +13,8 @@ from numba import njit
 from controllers.curves.bounds import NODE
 from controllers.curves.closest_point import chord_square, nearest_on_piece
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC, PIECE, PIECES, TREE
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
+from geometry.arrays import Array, IntArray
 
 BRANCHES = 8  # largest number of branches of one curve that are found; others are ignored
 

@@ -29,8 +29,8 @@ from controllers.curves.trajectory import (
     piece_velocity,
     wrap_phase,
 )
-from controllers.state import Array
 from controllers.work_array import work_array, work_integers
+from geometry.arrays import Array
 
 _TIE_TOLERANCE = 1e-11  # [m] a branch is searched only if it may improve the distance by more than this
 

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _EASING_FRACTION = 0.15  # fraction of the interval at each edge over which the blend is eased
 AXIS = 1e-3  # [m] nearer to the axis, derivatives are evaluated at this distance

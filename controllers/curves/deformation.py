@@ -31,7 +31,7 @@ from controllers.curves.trajectory import (
     find_piece,
     wrap_phase,
 )
-from controllers.state import Array
+from geometry.arrays import Array
 
 # The record's header: step of the grid [s]; h/2 [steps]; number of edits in force, and including those undone; capacity
 # of the table; TABLE to WORK are offsets from the start; then the grasped phase, its point (3), the pending edit.

@@ -8,7 +8,7 @@ import numpy as np
 from controllers.curves.deformation import DEPTH, EDIT, HALF, RECORD_HEADER, STEP, TABLE, work_curve
 from controllers.curves.trajectory import BREAKS, CHANNELS, COEFFICIENTS, PIECE, PIECES, Trajectory
 from controllers.errors import CurveError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _STEPS_PER_HALF_WIDTH = 16  # grid steps per half width h: the centre of a bump is at most h/32 from the grasped phase
 _MAX_DURATION_RATIO = 10_000  # largest duration of a curve in half widths: 160 000 steps, a hundred megabytes

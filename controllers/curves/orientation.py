@@ -4,15 +4,14 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, PIECE, find_piece, wrap_phase
-from controllers.rotations import multiply
-from controllers.state import Array
 from controllers.work_array import work_array
-
-_Quat = tuple[float, float, float, float]
+from geometry.arrays import Array
+from geometry.rotations import multiply
+from geometry.vectors import Quaternion, Vector
 
 
 @njit
-def curve_orientation(blob: Array, at: int, t: float) -> tuple[_Quat, tuple[float, float, float]]:
+def curve_orientation(blob: Array, at: int, t: float) -> tuple[Quaternion, Vector]:
     """Orientation R_H(t), unit quaternion wxyz, and its angular velocity ω_H [rad/s], of the curve at ``blob[at:]``.
 
     With s the spline through the quaternions, q = s/|s| and ω = 2 Im(ṡ ⊗ s*)/|s|². Where the phase of an open curve is

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit
@@ -39,10 +39,12 @@ def interpolate(rows: Array, stride: int, u: float, rate: float, value: Array, s
     """
     b0, b1, b2, b3 = basis(u)
     d0, d1, d2, d3 = basis_slope(u)
-    for k in range(value.shape[0]):
-        p0, p1, p2, p3 = rows[k], rows[stride + k], rows[2 * stride + k], rows[3 * stride + k]
-        value[k] = b0 * p0 + b1 * p1 + b2 * p2 + b3 * p3
-        slope[k] = rate * (d0 * p0 + d1 * p1 + d2 * p2 + d3 * p3)
+    n = value.shape[0]
+    p0, p1 = rows[:n], rows[stride : stride + n]
+    p2, p3 = rows[2 * stride : 2 * stride + n], rows[3 * stride : 3 * stride + n]
+    for k in range(n):
+        value[k] = b0 * p0[k] + b1 * p1[k] + b2 * p2[k] + b3 * p3[k]
+        slope[k] = rate * (d0 * p0[k] + d1 * p1[k] + d2 * p2[k] + d3 * p3[k])
 
 
 def periodic_interpolation(samples: Array, angles: Array) -> Array:

@@ -11,7 +11,8 @@ from numba import njit
 from controllers.checks import check_field_types, check_kind, checked, numbers_of
 from controllers.curves.bounds import capsule_tree
 from controllers.errors import CurveError
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.quaternions import with_continuous_signs
 
 # The packed curve: a header, then three blocks; every offset counts from the start of the header.
 SIZE, PIECES, PERIODIC, START, END, LEVELS, BREAKS, COEFFICIENTS, TREE, HEADER = range(10)
@@ -120,15 +121,14 @@ def _checked_samples(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -
     return array
 
 
-def _with_continuous_signs(quaternions: Array) -> Array:
+def _checked_signs(quaternions: Array) -> Array:
     """Flip signs so that neighbours agree; raises if samples are too far apart to tell the direction of turning."""
     dots = np.einsum("ij,ij->i", quaternions[:-1], quaternions[1:])
     if dots.size and np.abs(dots).min() < 0.5:
         at = int(np.abs(dots).argmin())
         angle = np.degrees(2.0 * np.arccos(np.abs(dots[at])))
         raise CurveError(f"orientation turns {angle:.0f}° from sample {at} to {at + 1}; sample it every 120° or less")
-    signs = np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
-    return quaternions * signs[:, None]
+    return with_continuous_signs(quaternions)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -202,7 +202,7 @@ class Trajectory:
         if np.abs(norms - 1.0).max() > 1e-6:
             worst = norms[np.abs(norms - 1.0).argmax()]
             raise CurveError(f"quaternions of a curve must have unit length, one has {worst:.6g}")
-        quaternions = _with_continuous_signs(quaternions / norms[:, None])
+        quaternions = _checked_signs(quaternions / norms[:, None])
         if self.periodic and 1.0 - abs(float(quaternions[-1] @ quaternions[0])) > 1e-9:
             raise CurveError("a periodic curve must repeat its first orientation as its last")
         return quaternions

@@ -6,7 +6,7 @@ from numba import njit
 
 from controllers.checks import numbers_of
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit

@@ -13,7 +13,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.river import River
-from controllers.state import Array
+from geometry.arrays import Array
 
 _KEYS = ("times", "positions", "quaternions", "numbers", "speeds")
 

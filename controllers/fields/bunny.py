@@ -12,7 +12,8 @@ from controllers.curves.trajectory import START, Trajectory, curve_point, curve_
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import follow_force
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, MAX_TIME_STEP, Array
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, MAX_TIME_STEP
+from geometry.arrays import Array
 
 
 @njit

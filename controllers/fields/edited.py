@@ -18,8 +18,9 @@ from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
 from controllers.fields.river import River, river_flow
-from controllers.state import HAND_POSITION, HAND_TIME, MAX_TIME_STEP, Array
+from controllers.state import HAND_POSITION, HAND_TIME, MAX_TIME_STEP
 from controllers.work_array import work_array
+from geometry.arrays import Array
 
 _NEAREST, _PERFORMANCE_TIME, _LAST_TIME, _MEMORY_SIZE = range(4)  # t* of φ', s, time of the last tick [s]
 _SAMPLE_INTERVAL = (

@@ -12,7 +12,8 @@ from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
-from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_VELOCITY
+from geometry.arrays import Array
 
 
 @njit

@@ -14,7 +14,8 @@ from controllers.fields.admissible import admissible_speeds, checked_speeds
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
-from controllers.state import HAND_POSITION, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_VELOCITY
+from geometry.arrays import Array
 
 _SPEEDS_OFFSET = 3  # offset of the pairs of speeds, which follow `GovernorGains`
 

@@ -17,8 +17,9 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from controllers.work_array import work_array
+from geometry.arrays import Array
 
 
 class Crossing(NamedTuple):

@@ -13,8 +13,9 @@ from controllers.checks import check_field_types, checked
 from controllers.fields.algebra.instructions import TRACE_SIZE, write_trace_point
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.walker_feed import WalkerFeed
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from controllers.walking.walking import FOLLOWED, Walking, followed_at
+from geometry.arrays import Array
 
 
 @njit

@@ -13,8 +13,9 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
-from controllers.rotations import logarithm, multiply
-from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION, Array
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION
+from geometry.arrays import Array
+from geometry.rotations import logarithm, multiply
 
 
 class OrientationGains(NamedTuple):

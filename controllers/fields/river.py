@@ -17,7 +17,7 @@ from controllers.fields.admissible import checked_speeds
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.window import window
 from controllers.fields.follow import Follow
-from controllers.state import Array
+from geometry.arrays import Array
 
 __all__ = ["Course", "River", "integrate", "window"]
 

@@ -24,9 +24,10 @@ from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.fields.algebra.law import Law, MapFeed, Program
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
-from controllers.rotations import logarithm, rotation_vector_rate
-from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY, Array
+from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import logarithm, rotation_vector_rate
 
 # Layout of a joint's row: [column of qpos, row of qvel, is a ball joint, three intervals (a hinge uses the first)].
 _COLUMN, _ROW, _IS_BALL, _LIMITS, _JOINT_SIZE = 0, 1, 2, 3, 9

@@ -24,12 +24,13 @@ from controllers.curves.deformation import (
 )
 from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import TRACE_SIZE, write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.follow import Follow, FollowGains, follow_wrench
-from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 
 CLICK_DISTANCE = 1e-3  # [m] a press during which the stylus moves less than this is a click, not an edit
 CLICK_TIME = 0.4  # [s] a shorter click undoes the last edit, a longer one redoes it

@@ -13,7 +13,7 @@ from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class ClipMap(KernelMap):

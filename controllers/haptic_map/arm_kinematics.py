@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.motion.vectors import Quaternion, Vector, product, turned, turned_back
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.vectors import Quaternion, Vector, product, turned, turned_back
 
 
 @njit

@@ -18,7 +18,8 @@ from controllers.haptic_map.own_map import (
     finite_differences,
     python_map,
 )
-from controllers.state import Array, Pose, stylus_path
+from controllers.state import Pose, stylus_path
+from geometry.arrays import Array
 
 STYLUS = 7  # numbers of a stylus pose: p_H (3), R_H (quaternion wxyz)
 STYLUS_TANGENT = 6  # linear velocity (3) and angular velocity (3), both in H

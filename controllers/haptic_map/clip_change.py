@@ -15,9 +15,10 @@ from numba import njit
 
 from controllers.borrowed import without_refcount
 from controllers.curves.splines import control_points, interpolate
-from controllers.rotations import angular_velocity, exponential, multiply, rotate
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import angular_velocity, exponential, multiply, rotate
 
 FPS = 120.0  # rows of o per second of the phase
 LEAD_IN = 0.1  # [s] before the gate at which the rows begin

@@ -12,8 +12,8 @@ from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cy
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, stored_lap
 from controllers.legs.limbs import Limb
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
 
 _CLIPS = 3
 _R_MIN, _R_MAX, _SHARE, _BLEND = range(4)

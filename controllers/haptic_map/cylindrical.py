@@ -17,8 +17,8 @@ from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
 from controllers.motion.inbetween import FOOT, ROOT, correction, packed_table, table_channels
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
 
 _CLIPS = 4
 _ORDINALS = ("first", "second", "third", "fourth")

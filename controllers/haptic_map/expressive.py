@@ -11,9 +11,10 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.map_stages import kernels_of
 from controllers.haptic_map.wrapped import Wrapped
-from controllers.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
 
 FADE_FROM = 2.0 * np.pi / 3.0  # [rad] stylus angle from which its effect fades out, to zero at half a turn
 _JOINTS, _ROWS = 0, 1

@@ -31,9 +31,7 @@ from controllers.legs.reaching import solve_reach
 from controllers.legs.skate_removal import with_planted_ends
 from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
-from controllers.motion.loops import checked_clip, forward_loop, rotate_about_vertical, rotate_in_plane, turn_of
-from controllers.rotations import multiply, relative
-from controllers.state import Array, Mask
+from controllers.motion.loops import checked_clip, forward_loop, rotate_in_plane, turn_of
 from controllers.walking.walked_path import (
     PATH_HEADING,
     PATH_LEAN,
@@ -45,6 +43,10 @@ from controllers.walking.walked_path import (
     straight_path,
 )
 from controllers.work_array import work_array
+from geometry.arrays import Array, Mask
+from geometry.quaternions import about_axis, product
+from geometry.rotations import multiply
+from geometry.vectors import unit_rotation
 
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
 
@@ -114,7 +116,7 @@ def _carry_along(  # noqa: PLR0913 - derivatives by either number of the walker 
     p[1 + by, 2] = rate * (upright * slope[2] - over * slope[1]) - leaning * side
     p[0, 0] += x
     p[0, 1] += y
-    _unit_rotation(value[3:], slope[3:], rate, by, q, spin)
+    spin[0, by], spin[1, by], spin[2, by] = unit_rotation(value[3:], slope[3:], rate, q)
     q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * lean), -np.sin(0.5 * lean), 0.0, 0.0, q[0], q[1], q[2], q[3])
     spin[0, by] -= leaning * (1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
     spin[1, by] -= leaning * 2.0 * (q[1] * q[2] - q[0] * q[3])
@@ -136,16 +138,6 @@ def _lowering(lean: float, leaning: float, width: float) -> tuple[float, float]:
     """
     size = np.sqrt(lean * lean + _LEAN_ROUNDING * _LEAN_ROUNDING)
     return width * (size - _LEAN_ROUNDING), width * leaning * lean / size
-
-
-@njit
-def _unit_rotation(value: Array, slope: Array, rate: float, by: int, q: Array, spin: Array) -> None:
-    """Unit quaternion of four channels and its local angular velocity (3, 2) by x, 2 Im(q⁻¹ ⊗ ṡ)/|s| times a rate."""
-    scale = 1.0 / np.sqrt(max(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2, 1e-12))
-    for j in range(4):
-        q[j] = scale * value[j]
-    _, x, y, z = relative(q[0], q[1], q[2], q[3], slope[0], slope[1], slope[2], slope[3])
-    spin[0, by], spin[1, by], spin[2, by] = 2.0 * rate * scale * x, 2.0 * rate * scale * y, 2.0 * rate * scale * z
 
 
 @njit
@@ -171,9 +163,10 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
     root[0, 2] -= lower
     root[1, 2] -= lowering
     for joint in range(1, rotations):
-        at = 3 + 4 * joint
-        _unit_rotation(value[at : at + 4], change[at : at + 4], 1.0, 1, q[joint], spins[joint])
-        _unit_rotation(value[at : at + 4], slope[at : at + 4], rate, 0, q[joint], spins[joint])
+        at, spin = 3 + 4 * joint, spins[joint]
+        for by, by_x, pace in ((1, change, 1.0), (0, slope, rate)):
+            turn = unit_rotation(value[at : at + 4], by_x[at : at + 4], pace, q[joint])
+            spin[0, by], spin[1, by], spin[2, by] = turn
     part, by_lap, by_form = work_array(7), work_array(7), work_array(7)
     for i in range(limbs):
         limb = params[_HEADER + LIMB_SIZE * i : _HEADER + LIMB_SIZE * (i + 1)]
@@ -297,7 +290,7 @@ class Led(KernelMap):
         # The path is along x, whichever way the figure faces while it walks.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
         channels[:, :2] = rotate_in_plane(course, channels[:, :2])
-        channels[:, 3:7] = rotate_about_vertical(course, channels[:, 3:7])
+        channels[:, 3:7] = product(about_axis(2, course), channels[:, 3:7])
         if capture is not None:
             channels = low_pass(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])

@@ -19,7 +19,7 @@ from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.legs.stance_hold import fresh_footing
 from controllers.motion.loops import checked_clip
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Lifted(ClipMap):

@@ -17,7 +17,7 @@ from controllers.blending.combination import (
 )
 from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.curves.cylinder import cylinder
-from controllers.curves.splines import basis, basis_slope, control_points, periodic_interpolation
+from controllers.curves.splines import control_points, interpolate, periodic_interpolation
 from controllers.haptic_map.lifting.cores import attract_to_core
 from controllers.haptic_map.lifting.frames import PlacedClip, frames_at, interpolate_frames, lap_spline, packed_frames
 from controllers.haptic_map.lifting.neighbours import SITE, near_clips, near_weights, packed_neighbours
@@ -29,8 +29,8 @@ from controllers.legs.stance_hold import packed_soles
 from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
 from controllers.saturation import soft_clamp
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array, work_integers
+from geometry.arrays import Array, IntArray
 
 _LAG_SAMPLES = 128  # samples of λ round the lap
 _MAX_ROWS = 256  # largest number of rows of the corrections' table round the lap
@@ -47,14 +47,9 @@ def _write_lags(control: Array, limbs: int, angle: float, channels: int, value: 
     """Write λ of each limb, which all clips share, into the channels of the first clip."""
     s = angle * _LAG_SAMPLES / (2.0 * np.pi)
     row = min(int(s), _LAG_SAMPLES - 1)
-    b0, b1, b2, b3 = basis(s - row)
-    c0, c1, c2, c3 = basis_slope(s - row)
-    for n in range(limbs):
-        v0, v1 = control[row * limbs + n], control[(row + 1) * limbs + n]
-        v2, v3 = control[(row + 2) * limbs + n], control[(row + 3) * limbs + n]
-        k = channels - N_END_CHANNELS * (limbs - n) + 3
-        value[0, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
-        slope[0, k] = _LAG_SAMPLES / (2.0 * np.pi) * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+    lags = slice(channels - N_END_CHANNELS * limbs + 3, channels, N_END_CHANNELS)
+    rate = _LAG_SAMPLES / (2.0 * np.pi)
+    interpolate(control[row * limbs :], limbs, s - row, rate, value[0, lags], slope[0, lags])
 
 
 @njit

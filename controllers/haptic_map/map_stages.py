@@ -12,8 +12,8 @@ from numba import njit, types
 
 from controllers.errors import ControllerError, ParameterError
 from controllers.kernel_call import kernel_call, register_kernel
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 Kernel: TypeAlias = Callable[[Array, Array, Array, Array, Array], None]
 """Compiled function (params, x, memory, pose, jacobian) of a map; writes or changes h(x), and h_*(x) unless empty."""

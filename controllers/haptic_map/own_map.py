@@ -14,8 +14,9 @@ from numba.extending import intrinsic
 
 from controllers.checks import numbers_of
 from controllers.errors import ParameterError
-from controllers.rotations import logarithm, multiply
-from controllers.state import Array, Pose
+from controllers.state import Pose
+from geometry.arrays import Array
+from geometry.rotations import logarithm, multiply
 
 _DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
 _CALLBACK_TYPE = ctypes.CFUNCTYPE(

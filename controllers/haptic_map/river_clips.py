@@ -33,8 +33,9 @@ from controllers.haptic_map.river_memory import (
     timing_curve,
 )
 from controllers.legs.limbs import Limb
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
 
 MAX_CHANGE_FRACTION = 0.7  # longest duration of a change, as a fraction of a round
 _LAP_TOLERANCE = 1e-6  # [s] largest difference between the laps of two rivers that have a change between them

@@ -12,12 +12,13 @@ from numba import njit
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, START, curve_acceleration, curve_point, curve_velocity, wrap_phase
-from controllers.easing import smooth_step, smooth_step_slope
 from controllers.haptic_map.clip_change import known_between, passed_gate
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY
-from controllers.rotations import multiply
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step, smooth_step_slope
+from geometry.rotations import multiply
 
 # Memory after the frame of the lap; phases are those of the round [s].
 # ACTIVE_RIVER: river of the clip that is playing. HAND_PHASE: last phase of the hand. HELD: 1 while the clip is held at

@@ -18,10 +18,10 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.arm_kinematics import arm_rates, bend_arm
 from controllers.haptic_map.base import STYLUS_TANGENT, KernelMap
 from controllers.haptic_map.map_stages import CompiledMap
-from controllers.motion.vectors import Vector, cross, product, turned
-from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import saturate_vector
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
+from geometry.vectors import Vector, cross, product, turned
 
 JOINTS = 7
 _HOME, _SCALE, _REACH, _TURN, _ORIENTATION, _LENGTHS, _ARM_ANGLE, _SIZE = 0, 3, 4, 6, 8, 12, 16, 17

@@ -8,7 +8,8 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.wrapped import Wrapped
-from controllers.state import Array, Pose
+from controllers.state import Pose
+from geometry.arrays import Array
 
 _SIZE = 0
 

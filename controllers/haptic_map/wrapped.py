@@ -2,7 +2,7 @@
 
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import CompiledMap
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Wrapped(HapticMap):

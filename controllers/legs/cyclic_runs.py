@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Mask
+from geometry.arrays import Mask
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:

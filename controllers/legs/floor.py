@@ -9,9 +9,10 @@ this constraint it is at −126 mm.
 import numpy as np
 from numba import njit
 
-from controllers.rotations import rotate
-from controllers.state import Array, Quat
+from controllers.state import Quat
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import rotate
 
 SOFTNESS = 2e-3
 """Softness of the minimum of sole heights when a pose is put on the floor [m]: four points at equal height count as

@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.easing import smooth_steps
 from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, lowest_point
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.sole_heights import STANCE_HEIGHT, SWING_HEIGHT
-from controllers.motion.channels import with_continuous_signs
 from controllers.motion.inbetween import FOOT, ROOT
-from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array
+from controllers.motion.loops import plane_exponential, rotate_in_plane
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
+from geometry.quaternions import about_axis, product, with_continuous_signs
 
 CATCH_UP = 8.0
 """Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends
@@ -157,7 +157,7 @@ def blended_feet(channels: Array, drifts: Array, limbs: Sequence[Limb], weights:
         heading = np.unwrap(2.0 * np.arctan2(turn[..., 3], turn[..., 0]), axis=0)
         closing = heading[:1] + 2.0 * np.pi * np.round((heading[-1:] - heading[:1]) / (2.0 * np.pi))
         heading = np.concatenate([heading, closing]) + angle
-        over_ground = rotate_about_vertical(angle, np.concatenate([turn, turn[:1]]))
+        over_ground = product(about_axis(2, angle), np.concatenate([turn, turn[:1]]))
         moves.append(contact_moves(rotate_in_plane(angle, place) + shift, over_ground, heading, limb))
         angles.append(angle)
     return BlendedFeet(np.stack(height, axis=2), np.stack(moves, axis=2), np.stack(angles, axis=2), own - ground)

@@ -20,14 +20,15 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.legs.limbs import CENTRE, FIRST, LIMB_SIZE, OFFSETS, Limb
 from controllers.legs.stance_hold import packed_soles
 from controllers.motion.inertialization import decaying_offset, stopping_distance
-from controllers.motion.vectors import Vector, vector_at
-from controllers.rotations import exponential, logarithm, multiply, relative, rotate
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
+from geometry.rotations import exponential, logarithm, multiply, relative, rotate
+from geometry.vectors import Vector, vector_at
 
 MAX_CONTINUED_ACCELERATION = 20.0
 """Largest linear acceleration of the old motion that is continued in a change, of the root and of feet [m/s²]: a hand
@@ -114,6 +115,13 @@ def _stopping_motion(values: Array, period: float, seconds: float, bound: float,
 
 
 @njit
+def _relative_turns(q: Array, ends: Array, turns: Array) -> None:
+    """Write the rotation vectors (3, 3) from an orientation q (4,) to those of three poses (3, 7)."""
+    for j in range(3):
+        turns[j] = logarithm(*relative(q[0], q[1], q[2], q[3], ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
+
+
+@njit
 def _end_heights(limbs: Array, pose: Pose, heights: Array) -> float:
     """Write the heights of the lowest points of the limbs' ends [m]; returns the least."""
     end = work_array(7)
@@ -197,24 +205,13 @@ def plan_steps(
         speed = np.sqrt(np.sum((ends[1, :3] - ends[2, :3]) ** 2)) * 0.5 / period
         stop = min(stop, max(2.0 * _MAX_STOPPING_DISTANCE / max(speed, 1e-9), _MIN_STOPPING_TIME))
         step[_STOP], step[FLOOR] = stop, ground
-        _stopping_motion(
-            ends[:, :3],
-            period,
-            stop,
-            MAX_CONTINUED_ACCELERATION,
-            step[_POSITION:_TURN],
-            step[_SHIFT:_TURN_SHIFT].reshape(3, 3),
-        )
-        w, x, y, z = ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6]
-        for j in range(3):
-            turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
-        change = step[_TURN_SHIFT:_STOP].reshape(3, 3)
+        shift, change = step[_SHIFT:_TURN_SHIFT].reshape(3, 3), step[_TURN_SHIFT:_STOP].reshape(3, 3)
+        _stopping_motion(ends[:, :3], period, stop, MAX_CONTINUED_ACCELERATION, step[_POSITION:_TURN], shift)
+        _relative_turns(ends[0, 3:], ends, turns)
         _stopping_motion(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
-        step[_TURN:_SHIFT] = multiply(w, x, y, z, *exponential(rest[0], rest[1], rest[2]))
+        step[_TURN:_SHIFT] = multiply(ends[0, 3], ends[0, 4], ends[0, 5], ends[0, 6], *exponential(*vector_at(rest, 0)))
         # Again relative to the rest orientation, since rotation vectors do not add exactly.
-        w, x, y, z = step[_TURN], step[_TURN + 1], step[_TURN + 2], step[_TURN + 3]
-        for j in range(3):
-            turns[j] = logarithm(*relative(w, x, y, z, ends[j, 3], ends[j, 4], ends[j, 5], ends[j, 6]))
+        _relative_turns(step[_TURN:_SHIFT], ends, turns)
         _stopping_motion(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
         change[0] = turns[0]
         limb_end(limbs[n], asked, ends[1])

@@ -21,7 +21,7 @@ from controllers.legs.cyclic_runs import runs
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.reaching import extension, shortfall
 from controllers.motion.channels import signed_like
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 # σ₋, σ₊: the excess of their sum over 1 gives a double support of a tenth of the flight. If the flight is divided 0.6
 # to 0.4 instead of equally, the pelvis is lowered by 7 cm more (docs/validation/led-figures.md).

@@ -14,10 +14,11 @@ run, jump and backflip, joints exceed their limits by at most 2.4°, without sat
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step, smooth_step_slope
-from controllers.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 from controllers.saturation import soft_clamp
-from controllers.state import Array, Quat
+from controllers.state import Quat
+from geometry.arrays import Array
+from geometry.easing import smooth_step, smooth_step_slope
+from geometry.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
 
 SATURATION_WIDTH = 0.1  # [rad] excess over a limit from which the joint stays at half of it beyond the limit
 _FADE_START, _FADE_END = 2.9, 3.13  # [rad] range of |v| over which S falls

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.limbs import N_END_CHANNELS, Limb
-from controllers.motion.channels import with_continuous_signs
-from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array
+from controllers.motion.loops import plane_exponential, rotate_in_plane
+from geometry.arrays import Array
+from geometry.quaternions import about_axis, product, with_continuous_signs
 
 SOFTMIN_WIDTH = 5e-4
 """Softness of the minimum of sole heights when feet are planted or the ground is estimated [m]: four points at equal
@@ -142,7 +142,7 @@ def end_channels(channels: Array, drifts: Array, limb: Limb, lag: Array) -> tupl
     shift, angle = plane_exponential(lag[:, None, None] * drifts)
     place[..., :2] = rotate_in_plane(-angle, place[..., :2] - shift)
     lags = np.broadcast_to(lag[:, None, None], (*place.shape[:2], 1))
-    return rotate_about_vertical(-angle, quaternions), np.concatenate([place, lags], axis=2)
+    return product(about_axis(2, -angle), quaternions), np.concatenate([place, lags], axis=2)
 
 
 def with_ends(channels: Array, drifts: Array, limbs: Sequence[Limb], weights: Array | None = None) -> Array:

@@ -23,7 +23,10 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.legs.joint_limits import saturate_joint
-from controllers.motion.vectors import (
+from controllers.state import Vec3
+from geometry.arrays import Array
+from geometry.two_links import MIN_FLEXION
+from geometry.vectors import (
     Vector,
     cross,
     dot,
@@ -36,7 +39,6 @@ from controllers.motion.vectors import (
     turned_back,
     vector_at,
 )
-from controllers.state import Array, Vec3
 
 # A packed limb (`Limb.packed`): indices of its three joints, their offsets (3, 3), flexion axis, centre of the end's
 # points, limits (3, 3, 2); for a limb that steps, the points of its sole follow (`footsteps`).
@@ -45,12 +47,11 @@ THIGH, SHANK = OFFSETS + 3, OFFSETS + 6  # offsets of the middle and the last jo
 N_END_CHANNELS = 4  # channels that a limb adds to a clip: its end's position (3), λ (`limb_ends`)
 
 _SATURATION_FLEXION = 0.2  # [rad] flexion below which the correction saturates
-_MIN_FLEXION = 0.03  # [rad] least flexion, for a target out of reach
 _NO_LIMIT = 2.0 * np.pi  # [rad] beyond any rotation vector: no limit
 # [rad] margin on the range that a clip uses, for poses between its frames: at 120 frames per second a joint that
 # accelerates by a = 1000 rad/s² exceeds them by a Δt²/8 = 0.009 rad.
 _RANGE_MARGIN = 0.01
-_SOFT_COSINE, _HARD_COSINE = float(np.cos(_SATURATION_FLEXION)), float(np.cos(_MIN_FLEXION))
+_SOFT_COSINE, _HARD_COSINE = float(np.cos(_SATURATION_FLEXION)), float(np.cos(MIN_FLEXION))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,15 +23,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from controllers.curves.splines import periodic_interpolation
-from controllers.easing import smooth_steps
 from controllers.legs.cyclic_runs import runs
 from controllers.legs.footfalls import CATCH_UP, accumulated_slip
 from controllers.legs.limb_ends import SOFTMIN_WIDTH, contact_moves, end_channels, lowest_point
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.reaching import shortfall, solve_reach
 from controllers.motion.channels import signed_like
-from controllers.motion.loops import plane_exponential, rotate_about_vertical, rotate_in_plane
-from controllers.state import Array, Mask
+from controllers.motion.loops import plane_exponential, rotate_in_plane
+from geometry.arrays import Array, Mask
+from geometry.easing import smooth_steps
+from geometry.quaternions import about_axis, product
 
 # Fraction of a swing at each end over which g rises. Half of it, or half a swing, changes the foot slide of eight led
 # captures (in the animation) by at most 0.3 cm, and does not change their knees.
@@ -114,12 +115,12 @@ def planted_ends(
     places = rotate_in_plane(angle, np.concatenate([ends[:, :2], ends[:1, :2]])) + shift
     # First the heading, then the position, since the roll of a foot depends on its heading.
     for mask in ((0.0, 0.0, 1.0), (1.0, 1.0, 0.0)):
-        over_ground = rotate_about_vertical(angle, np.concatenate([quaternions, quaternions[:1]]))
+        over_ground = product(about_axis(2, angle), np.concatenate([quaternions, quaternions[:1]]))
         heading = np.unwrap(2.0 * np.arctan2(over_ground[:, 3], over_ground[:, 0]))
         moves = contact_moves(places[:, None], over_ground[:, None], heading[:, None], limb)[:, 0]
         ahead = mask * accumulated_slip(hold[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
         ends[:, :2] -= rotate_in_plane(-angle[:-1], ahead[:, :2])
-        quaternions = rotate_about_vertical(-ahead[:, 2], quaternions)
+        quaternions = product(about_axis(2, -ahead[:, 2]), quaternions)
     level = levels(heights, stands)
     low = (1.0 - smooth_mask(stands, _SETTLING_RATIO, _MAX_SETTLING_TIME * n / duration)) * _soft_max(
         0.0, heights - level

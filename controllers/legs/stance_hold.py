@@ -21,13 +21,15 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.legs.limbs import Limb
 from controllers.legs.sole_heights import STANCE_HEIGHT
-from controllers.rotations import multiply, rotate
-from controllers.state import Array, Quat
+from controllers.state import Quat
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
+from geometry.rotations import multiply, rotate
+from geometry.vectors import Quaternion
 
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
 # 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.
@@ -98,7 +100,7 @@ def mixing_degree(weights: Array) -> float:
 
 
 @njit
-def _turn_sole(sole: Array, q: tuple[float, float, float, float], levers: Array) -> float:
+def _turn_sole(sole: Array, q: Quaternion, levers: Array) -> float:
     """Write the points of a sole (k, 3) turned by q; returns the height of the lowest."""
     least = np.inf
     for i in range(sole.shape[0]):
@@ -109,7 +111,7 @@ def _turn_sole(sole: Array, q: tuple[float, float, float, float], levers: Array)
 
 
 @njit
-def _yaw(angle: float, q: Array) -> tuple[float, float, float, float]:
+def _yaw(angle: float, q: Array) -> Quaternion:
     return multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
 
 

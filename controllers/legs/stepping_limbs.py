@@ -14,13 +14,14 @@ limb stays as in its motion.
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.legs.footsteps import FLOOR, lever, sole_height
 from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB_SIZE, MIDDLE, OFFSETS, SHANK, THIGH, solve_limb
-from controllers.motion.vectors import cross, dot, product, turned_back, vector_at
-from controllers.rotations import exponential, multiply
-from controllers.state import Array, Pose
+from controllers.state import Pose
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
+from geometry.rotations import exponential, multiply
+from geometry.vectors import cross, dot, product, turned_back, vector_at
 
 _MAX_LOWERING_HEIGHT = 0.12  # [m] height of a foot above which the root is not lowered to reach it
 # Extension of a limb over its length above which the root is lowered: a knee bent by 36°. With 0.9 and 0.98 the

@@ -16,7 +16,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.motion.channels import closing_signs, normalise
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @dataclass(frozen=True)

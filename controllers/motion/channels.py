@@ -2,14 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
-
-
-def with_continuous_signs(quaternions: Array) -> Array:
-    """The same rotations (n, ..., 4), each with the sign that is nearer to the one before it."""
-    dots = np.einsum("n...x,n...x->n...", quaternions[:-1], quaternions[1:])
-    signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)[..., None]
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs])
+from geometry.arrays import Array
 
 
 def signed_like(quaternions: Array, others: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.splines import basis, basis_slope, control_points
-from controllers.state import Array
+from geometry.arrays import Array
 
 ROOT, FOOT = 2, 4  # channels: of the root (x, y), of each limb's end (x, y, z, heading)
 _ROWS, _NODES, _CHANNELS, _TABLE = range(4)

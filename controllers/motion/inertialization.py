@@ -20,8 +20,9 @@ import math
 
 from numba import njit
 
-from controllers.rotations import exponential, multiply
-from controllers.state import Array, Pose, Tangent
+from controllers.state import Pose, Tangent
+from geometry.arrays import Array
+from geometry.rotations import exponential, multiply
 
 # Overshoot over T ȯ that is assumed in limiting it; the term of ȯ, x (1 + 3x) (1 − x)³, reaches 16/81 = 0.198.
 _OVERSHOOT_RATIO = 0.16

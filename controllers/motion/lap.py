@@ -14,7 +14,7 @@ and the figure moves by ∫ ξ ds along the hand's path (by the trapezoid rule, 
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 LAP_X, LAP_Y, LAP_HEADING, LAST_ANGLE, LAPS, LAST_DRIFT = range(6)
 MEMORY = LAST_DRIFT + 3

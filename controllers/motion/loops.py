@@ -13,8 +13,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
-from controllers.motion.channels import normalise, with_continuous_signs
-from controllers.state import Array
+from controllers.motion.channels import normalise
+from geometry.arrays import Array
+from geometry.quaternions import about_axis, product, with_continuous_signs
 
 # [m], [rad] a lap that ends nearer to its start has no drift
 _MAX_STILL_LENGTH, _MAX_STILL_ANGLE = 0.02, np.deg2rad(2.0)
@@ -41,13 +42,6 @@ def rotate_in_plane(angle: Array, xy: Array) -> Array:
     """Vectors of the plane (..., 2) turned by angles (...)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * xy[..., 0] - s * xy[..., 1], s * xy[..., 0] + c * xy[..., 1]], axis=-1)
-
-
-def rotate_about_vertical(angle: Array, quaternions: Array) -> Array:
-    """Quaternions (..., 4) turned about the vertical by angles (...): q_z ⊗ q."""
-    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    return np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], axis=-1)
 
 
 def _periodic_spline(s: Array, values: Array, sign: float) -> CubicSpline:
@@ -128,7 +122,7 @@ class Loop:
         rotations = [part / np.linalg.norm(part, axis=1, keepdims=True) for part in parts[1:]]
         shift, angle = plane_exponential(lead[:, None] * self.drift)
         parts[0][:, :2] = rotate_in_plane(angle, parts[0][:, :2]) + shift
-        rotations[0] = rotate_about_vertical(angle, rotations[0])
+        rotations[0] = product(about_axis(2, angle), rotations[0])
         return np.concatenate([parts[0], *rotations], axis=1)
 
 
@@ -183,7 +177,7 @@ def periodic_remainder(poses: Array, s: Array, drift: Array) -> Array:
     rest = poses.copy()
     shift, angle = plane_exponential(s[:, None] * drift)
     rest[:, :2] = rotate_in_plane(-angle, poses[:, :2] - shift)
-    rest[:, 3:7] = rotate_about_vertical(-angle, poses[:, 3:7])
+    rest[:, 3:7] = product(about_axis(2, -angle), poses[:, 3:7])
     return rest
 
 
@@ -195,7 +189,7 @@ def placed_at_origin(poses: Array, s: Array) -> Array:
     # Mean heading by the doubled half angle, which is independent of the sign of a quaternion.
     heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
     placed[:, :2] = rotate_in_plane(np.array(-heading), placed[:, :2])
-    placed[:, 3:7] = rotate_about_vertical(np.full(len(s), -heading), placed[:, 3:7])
+    placed[:, 3:7] = product(about_axis(2, np.full(len(s), -heading)), placed[:, 3:7])
     return placed
 
 

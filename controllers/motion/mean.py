@@ -15,9 +15,10 @@ All of this also holds if some weights are negative: M need not be definite.
 import numpy as np
 from numba import njit
 
-from controllers.rotations import multiply, relative
-from controllers.state import Array, Quat
+from controllers.state import Quat
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import multiply, relative
 
 _NormalEquations = tuple[float, float, float, float, float, float, float, float, float]
 

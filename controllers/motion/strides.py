@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.motion.loops import Loop
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 _SAMPLES = 128  # per lap; half or twice as many give the same strides for the nine embedded clips
 _MAX_REPEATS = 12  # largest number of repeats that is tried for a clip

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 
 def least_cost_lead(cost: Array, changes: Sequence[int], prices: Array) -> IntArray:

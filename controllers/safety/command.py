@@ -19,7 +19,8 @@ from controllers.safety.faults import (
     ramp_in,
 )
 from controllers.safety.limiter import LIMITER_FAULT, LIMITER_FORCE, bound_force, slew_force
-from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
+from geometry.arrays import Array
 
 
 @njit

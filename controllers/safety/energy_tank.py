@@ -17,7 +17,7 @@ from numba import njit
 
 from controllers.checks import check_field_types
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _POWER, _CAPACITY, _DRAIN, _PERIOD = range(4)
 TANK_ENERGY, TANK_SCALE, TANK_POSITION, TANK_FORCE, TANK_STARTED, TANK_SIZE = 0, 1, 2, 5, 8, 9

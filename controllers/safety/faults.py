@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Fault(IntEnum):

@@ -35,7 +35,8 @@ from controllers.safety.arming import (
 from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
 from controllers.safety.limiter import magnitude
 from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
-from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY
+from geometry.arrays import Array
 
 _PERIOD, _MAX_FORCE, _MAX_CHANGE, _MAX_SPEED, _SPEED_MARGIN, _MARGIN, _SMALL_FORCE, _QUIET_TIME, _RAMP_TIME = range(9)
 _DEAD_MAN, _PERMITTED, _LOW_CORNER, _HIGH_CORNER, _SIZE = 9, 10, 11, 14, 17

@@ -7,7 +7,7 @@ from numba import njit
 
 from controllers.errors import ParameterError
 from controllers.safety.faults import FORCE_NOT_FINITE, LIMITER_NOT_FINITE
-from controllers.state import Array
+from geometry.arrays import Array
 
 _CONTINUOUS, _PEAK, _HEAT_COEFFICIENT, _MAX_CHANGE = range(4)
 THERMAL_TIME = 10.0

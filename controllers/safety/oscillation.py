@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 _PERIOD, _LOW_PASS, _THRESHOLD, _COUNT_DECAY, _MAX_COUNT, _GAIN_FALL, _GAIN_RISE, _TIME_DECAY, _MAX_TIME = range(9)
 OSCILLATION_LAST, OSCILLATION_COUNT, OSCILLATION_GAIN, OSCILLATION_TIME, OSCILLATION_SIZE = 3, 6, 7, 8, 9

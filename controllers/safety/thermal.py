@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.limiter import force_ceiling
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit

@@ -16,9 +16,9 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import checked
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
+from geometry.easing import smooth_step
 
 # Indices of a decision: u, u_0 at the entry of the stance, u_1, and the end of the stance at which it was entered
 # (0: its begin; 1: its end, when walking backwards; −1: in flight).

@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.splines import basis
-from controllers.gravity import GRAVITY
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 
 STEP = 0.03  # Δ [m]
 ROWS = 2048  # rows of the ring buffer: the last 61 m of the path are kept

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.state import MAX_TIME_STEP, Array
+from controllers.state import MAX_TIME_STEP
 from controllers.walking.gait import DECISION, Gait, decide_flight, fresh_decision, share_of_stance
 from controllers.walking.walked_path import (
     PACKED_PATH,
@@ -28,6 +28,7 @@ from controllers.walking.walked_path import (
     path_front,
     path_value,
 )
+from geometry.arrays import Array
 
 _ARGUMENT_SIZE = 7
 _FLIGHT_OFFSET = _ARGUMENT_SIZE + 5

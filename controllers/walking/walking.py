@@ -9,8 +9,7 @@ from numba import njit
 
 from controllers.checks import checked
 from controllers.errors import ParameterError
-from controllers.gravity import GRAVITY
-from controllers.state import HAND_POSITION, HAND_TIME, Array
+from controllers.state import HAND_POSITION, HAND_TIME
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import STEP, path_front, straight_path
 from controllers.walking.walker import (
@@ -23,6 +22,8 @@ from controllers.walking.walker import (
     path_place,
     walker_at,
 )
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 
 _PENDULUM_HEIGHT = (
     1.0  # [m] height of the linear inverted pendulum that models the lean; the centre of mass stands at 1.02

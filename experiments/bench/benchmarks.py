@@ -19,7 +19,7 @@ from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
-from controllers.state import Array, HandState, IntArray, stylus_path
+from controllers.state import HandState, stylus_path
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figure_cost import figure_cost
 from experiments.bench.figures import BenchmarkResult, print_figures
@@ -37,6 +37,7 @@ from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.walls import figure_walls
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
+from geometry.arrays import Array, IntArray
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip

@@ -12,7 +12,8 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import Array, HandState
+from controllers.state import HandState
+from geometry.arrays import Array
 
 
 @njit

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
-from controllers.gravity import GRAVITY
 from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
+from geometry.physics import GRAVITY
 
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
 _MAX_SHOWN_SIZE = 12  # largest array that the page shows

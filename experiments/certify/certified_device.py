@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from controllers.certificates.loop.device import Device
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import forward_kinematics, jacobian, vector_to_hand_frame
 from models.phantom.parameters import PREMIUM_1_5

@@ -21,13 +21,13 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
 from experiments.certify.certified_field import given_curves
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes.lifted_runs import lifted_river, side_by_side
 from experiments.setups.modes.rivers import default_choice, law_of
+from geometry.arrays import Array
 
 
 class Meeting(NamedTuple):

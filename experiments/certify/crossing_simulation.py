@@ -9,8 +9,9 @@ from controllers.certificates.switching.switching_search import Course, Push
 from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
-from controllers.state import POSITION, Array
+from controllers.state import POSITION
 from experiments.certify.trial_simulation import trial_model
+from geometry.arrays import Array
 from models.phantom.kinematics import jacobian, linkage_angles, vector_to_hand_frame
 from models.phantom.spec import LINKAGE_JOINTS
 from models.world.scene import PHANTOM

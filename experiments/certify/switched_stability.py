@@ -11,7 +11,7 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[HandImpedance]) -> Verdict:

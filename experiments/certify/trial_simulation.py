@@ -23,8 +23,9 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
 from controllers.fields.follow import Follow
-from controllers.state import HAND_POSITION, Array
+from controllers.state import HAND_POSITION
 from experiments.certify.certified_device import phantom_device
+from geometry.arrays import Array
 from models.phantom.kinematics import linkage_angles
 from models.phantom.spec import LINKAGE_JOINTS, phantom_spec
 from models.world.scene import PHANTOM, R_WP

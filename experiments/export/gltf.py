@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.motion.clip import Clip

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
 from experiments.files.atomic_file import atomic_file
+from geometry.arrays import Array
 
 
 def cached_array(

@@ -12,8 +12,8 @@ from controllers.errors import ControllerError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array
 from experiments.files.atomic_file import atomic_file
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError

@@ -17,10 +17,10 @@ import numpy as np
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.led import Led
 from controllers.legs.sole_heights import SWING_HEIGHT
-from controllers.state import Array
 from controllers.walking.gait import Gait
 from experiments.files.array_cache import cached_array
-from models.gravity import GRAVITY
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from sim.compilation.sources import results_folder

@@ -6,7 +6,7 @@ import numpy as np
 from controllers.legs.footsteps import packed_steppers
 from controllers.legs.joint_limits import SATURATION_WIDTH
 from controllers.legs.limbs import Limb
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, joint_range
 
 

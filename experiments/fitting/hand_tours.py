@@ -3,12 +3,13 @@
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import cubic_steps
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.fitting.verdict import FPS, SECONDS
+from geometry.arrays import Array
+from geometry.easing import cubic_steps
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 

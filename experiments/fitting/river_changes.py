@@ -11,16 +11,17 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.clip_change import FPS, LEAD_IN, ClipChange
 from controllers.haptic_map.river_clips import MAX_CHANGE_FRACTION, RiverClips
 from controllers.haptic_map.river_memory import ACTIVE_RIVER, HAND_PHASE
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.console.progress import working
 from experiments.files.array_cache import cached_array, is_cached
 from experiments.fitting.figure_legs import packed_legs
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.feasible import Feasible, contact_forces, feasible
 from models.mocap.preparation.stances import Stances, stances

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from controllers.easing import smooth_steps
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
 from experiments.fitting.figure_legs import packed_legs
 from experiments.fitting.verdict import FPS, Trial
+from geometry.easing import smooth_steps
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, reference_along
 

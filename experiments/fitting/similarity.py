@@ -12,10 +12,10 @@ import numpy as np
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
-from controllers.state import Array
 from experiments.files.array_cache import cached_array
 from experiments.fitting.hand_tours import domain, poses_about_circle
 from experiments.fitting.verdict import MAX_FOOT_SKATE, Motion, motion_of
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES
 from sim.compilation.sources import results_folder
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
 from experiments.console.progress import working
 from experiments.files.array_cache import cached_array
+from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges

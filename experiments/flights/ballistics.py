@@ -18,13 +18,13 @@ from controllers.certificates.flight.flight_fit import FlightFit, find_flights, 
 from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
-from controllers.gravity import GRAVITY
-from controllers.state import Array, Mask
 from experiments.files.certificate_files import clip_inputs
+from geometry import quaternions
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import N_POSE
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.motion.foot_skate import stance_skates
 from models.mocap.motion.kinematics import sole_points

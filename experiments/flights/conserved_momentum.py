@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from controllers.state import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.dynamics.momentum import Momentum, momentum
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 
 ROUNDS = 4  # iterations, since momentum by finite differences also depends on the rotations of neighbouring frames

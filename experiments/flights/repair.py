@@ -8,10 +8,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
-from controllers.gravity import GRAVITY
-from controllers.state import Array, Mask
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
 from experiments.flights.conserved_momentum import with_constant_momentum
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.moved_legs import displaced_with_planted_feet, hip_to_ankle

@@ -4,10 +4,10 @@ import time
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
 from experiments.files.json_text import json_text
 from experiments.hardware.run_options import EMULATED, CalibrateHardware, check_emulate
+from geometry.arrays import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
 from models.world.scene import SceneConfig

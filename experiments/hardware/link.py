@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.devices.driver import JITTER, LOST, READ, REFUSED, ROUND_TRIP, STALENESS, Driver
 from sim.devices.exchange import READING_SIZE
 

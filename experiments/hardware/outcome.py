@@ -9,7 +9,7 @@ import numpy as np
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import Link
-from models.arrays import rms
+from geometry.arrays import rms
 from sim.hardware.controls import RunStatus
 from sim.hardware.servo_process import Ended, Ready
 from sim.recording.recording import Recording, RecordingError

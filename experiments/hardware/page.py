@@ -10,12 +10,12 @@ import numpy as np
 
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
-from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.hardware.link import link_now
 from experiments.hardware.parts import served, session_of
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
+from geometry.arrays import Array
 from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.process_start import parent_id
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE

@@ -7,12 +7,12 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.safety.gate import Gate
-from controllers.state import Array
 from experiments.config.run_config import Clock, RunConfig, phantom_of
 from experiments.files.device_files import Calibration
 from experiments.hardware.arming_checks import check_device
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
+from geometry.arrays import Array
 from models.world.scene import P_WH, PHANTOM, SceneConfig
 from sim.devices.device import DeviceState
 from sim.devices.driver import Driver

@@ -9,8 +9,8 @@ import numpy as np
 
 from controllers.blending.pair_corrections import neighbouring_pairs
 from controllers.haptic_map.animation import ClipMap
-from controllers.state import Array
 from experiments.lifting.motion_measure import MotionMeasure, measure_motion
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.motion.clip import Clip
 

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.devices.exchange import READING_SIZE, READING_SWITCH
 from sim.devices.hardware_list import list_devices, open_hid
 from sim.devices.spacemouse import SpaceMouse

@@ -13,7 +13,6 @@ import numpy as np
 import viser
 
 from controllers.errors import ControllerError
-from controllers.state import Array
 from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import open_cap_hand
@@ -28,6 +27,7 @@ from experiments.live.panels.takes_panel import TakesPanel
 from experiments.live.panels.uploads_panel import UploadsPanel
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
+from geometry.arrays import Array
 from models.errors import ModelError
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault

@@ -9,7 +9,6 @@ from matplotlib.patches import Circle
 
 from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
-from controllers.state import Array
 from experiments.config.modes import Follow
 from experiments.paper_figures.silhouettes import Silhouettes
 from experiments.paper_figures.sources import (
@@ -24,7 +23,8 @@ from experiments.paper_figures.sources import (
 from experiments.paper_figures.space import arrows, path, workspace
 from experiments.results.folder import config_of
 from experiments.results.pages.figures import PALE_TUBE
-from models.mocap.motion.quaternions import heading
+from geometry.arrays import Array
+from geometry.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from controllers.state import Array
 from experiments.config.maps import Cylindrical
 from experiments.paper_figures.silhouettes import Paint, Silhouettes
 from experiments.paper_figures.sources import (
@@ -21,8 +20,9 @@ from experiments.paper_figures.sources import (
 )
 from experiments.paper_figures.space import path, workspace
 from experiments.results.folder import clips_of, config_of
+from geometry.arrays import Array
+from geometry.quaternions import heading
 from models.mocap.motion.clip import Clip
-from models.mocap.motion.quaternions import heading
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.world.scene import FIRST_HIDDEN_GROUP
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
 from experiments.config.maps import Composite, RiverClips
 from experiments.config.modes import Rivers, StretchThenFollow
 from experiments.config.run_config import RunConfig, User
 from experiments.runs.demo import demo_config
+from geometry.arrays import Array
 from sim.recording.recording import Recording
 
 CYLINDER, COMPOSITE, STRETCH, RIVERS = "cylinder", "composite", "stretch", "rivers"

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 _AZIMUTH = -60.0  # of the viewer [degrees]
 

@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
 

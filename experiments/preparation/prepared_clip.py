@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.console.progress import working
 from experiments.files.array_cache import cached_array, is_cached
+from geometry.arrays import Array
 from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
 from sim.compilation.sources import results_folder

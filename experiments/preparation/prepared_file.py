@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.tracking_trial import Followed
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text

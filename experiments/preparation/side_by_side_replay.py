@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.body.clip_motion import clip_motion

@@ -10,7 +10,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from controllers.state import Array
 from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.render.captions import Captions, Entry, halved
 from experiments.render.film_file import FilmFile, check_target
@@ -20,6 +19,7 @@ from experiments.render.shown_world import GHOST, GHOST_WHITE, ShownWorld, mixed
 from experiments.render.timeline import Ghost, Timeline, timeline
 from experiments.results.folder import RECORDING
 from experiments.results.measures.phases import performance_start
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, TUBE, USER

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.world.scene import FIRST_HIDDEN_GROUP
 
 _GEOM = mujoco.mjtGeom

@@ -5,15 +5,15 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 
-from controllers.state import Array
 from experiments.render.graphics import Canvas, Image, View, offscreen_backend
 from experiments.render.scenes import Stage, Workspace
 from experiments.render.shown_world import SHADOW_REACH, STAGE, ShownWorld, shown_world
 from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
+from geometry.arrays import Array
+from geometry.quaternions import heading
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import PlanarDisplacement
-from models.mocap.motion.quaternions import heading
 from sim.errors import SimError
 from sim.recording.recording import Recording
 

@@ -7,11 +7,11 @@ from typing import Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from controllers.state import Array
 from experiments.render.graphics import Canvas, Image, View
 from experiments.render.lowest_point import lowest_point, seen_geoms
 from experiments.render.shown_world import BENCH, GHOST, STAGE, ShownWorld, mixed_with_white
 from experiments.render.timeline import Timeline
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
 from sim.recording.recording import Recording
 from sim.viewer.framing import typical_peak

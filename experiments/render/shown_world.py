@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from controllers.state import Array
 from experiments.results.folder import is_device_recording, scene_of
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE, figure_spec
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
 from sim.errors import SimError

@@ -6,11 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from controllers.state import Array, IntArray
 from experiments.render.shown_world import ShownWorld
 from experiments.results.folder import DEFAULT
+from geometry.arrays import Array, IntArray
+from geometry.quaternions import heading
 from models.mocap.library import load_clip
-from models.mocap.motion.quaternions import heading
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.framing import view_offsets

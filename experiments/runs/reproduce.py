@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-from controllers.state import Array
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig
 from experiments.files.map_files import map_digest
 from experiments.results.folder import RECORDING, clips_of, config_of, is_device_recording
 from experiments.setups.parts.devices import check_hand
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.loop.channels import Channels, channels
 from sim.loop.loop import Loop

@@ -13,7 +13,6 @@ from typing import Any
 from rich.console import Console
 
 from controllers.checks import check_kind
-from controllers.state import Array
 from experiments.config.keywords import to_keywords, with_keyword_messages
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
@@ -23,6 +22,7 @@ from experiments.results.measures.summary import RunSummary
 from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations, write_summary
 from experiments.setups.session import Session
+from geometry.arrays import Array
 from models.mocap.library import check_target
 from sim.errors import SimError
 from sim.recording.recording import Recording

@@ -18,7 +18,7 @@ from controllers.fields.algebra.law import Law
 from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import EnergyTank
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array, HandState, Wrench, stylus_path
+from controllers.state import HandState, Wrench, stylus_path
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_dict
 from experiments.config.run_config import REPLAY_WITH_USER, Clock, Figure, Phantom, Replay, check_seed
@@ -36,6 +36,7 @@ from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import check_rates, check_seconds, wire_parts
+from geometry.arrays import Array
 from models.world.scene import SceneConfig
 from sim.devices.device import available_ticks
 from sim.loop.loop import Loop

@@ -5,10 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from controllers.walking.walker import walker_at
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.session import Session
+from geometry.arrays import Array
 from sim.reference.reference import make_reference, map_poses, reference_along
 
 

@@ -13,9 +13,10 @@ from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.haptic_map.base import HapticMap
-from controllers.state import Array, HandState
+from controllers.state import HandState
 from experiments.setups.parts.devices import recorded_as
 from experiments.setups.parts.part_types import Parts, Settings
+from geometry.arrays import Array
 from models.humanoid.skeleton import standing_com
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5

@@ -11,15 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import smooth_steps
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.haptic_map.river_clips import RiverClips
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.results.measures.soles import Soles
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.motion.clip import pose_difference
 from models.mocap.motion.kinematics import sole_points

@@ -20,7 +20,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import HAND_POSITION, HAND_QUATERNION, Array
+from controllers.state import HAND_POSITION, HAND_QUATERNION
 from experiments.certify.trial_simulation import trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
@@ -35,6 +35,7 @@ from experiments.setups.modes.rivers import (
 )
 from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
+from geometry.arrays import Array
 from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.users.hand.actions import Push

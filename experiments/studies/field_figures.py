@@ -20,9 +20,10 @@ from controllers.fields.edited import Edited, performance
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River, integrate
-from controllers.state import Array, HandState
+from controllers.state import HandState
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
+from geometry.arrays import Array
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]

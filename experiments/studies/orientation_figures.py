@@ -16,13 +16,14 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from controllers.rotations import logarithm, multiply, rotate
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.config.options import run_config
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.results.pages.figures import AXES, STYLE
 from experiments.runs.run import run
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
+from geometry.rotations import logarithm, multiply, rotate
 from models.humanoid.skeleton import BODIES, N_POSE
 from models.world.scene import FIGURE, world_model
 from sim.recording.recording import Recording

@@ -21,7 +21,6 @@ import numpy as np
 from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable, off_pace, timing_clip, with_loop_first
@@ -31,7 +30,7 @@ from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
-from models.arrays import rms
+from geometry.arrays import Array, rms
 from models.errors import ModelError
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges

@@ -11,14 +11,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.easing import smooth_step
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.algebra.law import Program
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
-from controllers.state import VELOCITY, Array
+from controllers.state import VELOCITY
 from experiments.config.options import run_config
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
@@ -26,6 +25,8 @@ from experiments.setups.parts.governor import speeds_along
 from experiments.setups.parts.part_types import ClipMapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 from models.humanoid.skeleton import rest_pose
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import Loop

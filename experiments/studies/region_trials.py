@@ -19,10 +19,10 @@ from controllers.certificates.region.region import region
 from controllers.certificates.report import Verdict
 from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
 from experiments.certify.certify import certified_rivers
 from experiments.certify.trial_simulation import FULL_CONDITIONS, Trial, hand_path
 from experiments.config.run_config import RunConfig
+from geometry.arrays import Array
 
 HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400  # of a simulation

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
 from experiments.trials.trial.trial_log import TrialLog
-from models.arrays import rms
+from geometry.arrays import Array, rms
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.library import embedded_names
 from models.mocap.motion.clip import Clip

@@ -17,12 +17,11 @@ import numpy as np
 from rich.console import Console
 from scipy.signal import butter, sosfiltfilt
 
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
-from models.arrays import rms
+from geometry.arrays import Array, rms
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import pose_errors
 from models.phantom.parameters import PREMIUM_1_5

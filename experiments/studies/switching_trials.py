@@ -19,13 +19,13 @@ from controllers.certificates.switching.switching import HandRetention, Selectio
 from controllers.certificates.switching.switching_search import Push, failure
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
-from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle
 from experiments.certify.crossing_simulation import simulated_course
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
+from geometry.arrays import Array
 
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] pushes that are tried on every crossing, up to 4 N
 UNCERTIFIED_FORCE, NEVER_LOST_FORCE = (

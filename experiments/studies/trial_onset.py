@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness, slowest_mode
-from controllers.state import Array
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import Conditions, Trial, simulate
+from geometry.arrays import Array
 
 LARGEST = 20.0  # ratio to the initial distance beyond which a motion is no longer taken to be linear
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL
 from experiments.tuning.tune_config import TuneConfig, read_tuning
 from experiments.tuning.tuning import Tuned, run_tuning
+from geometry.arrays import Array
 
 
 def replication(config: TuneConfig, number: int) -> TuneConfig:

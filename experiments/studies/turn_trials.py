@@ -17,10 +17,10 @@ from scipy.interpolate import CubicSpline
 
 from controllers.certificates.flight.ballistic import BodyMotion
 from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA
-from controllers.gravity import GRAVITY
-from controllers.state import Array
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.parts.clips import load_clips
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.motion.clip import Clip
 

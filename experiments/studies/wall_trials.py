@@ -8,11 +8,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.rotations import exponential, multiply
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
+from geometry.rotations import exponential, multiply
 from models.humanoid.skeleton import JOINTS, N_POSE
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip

@@ -10,7 +10,6 @@ from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness
 from controllers.errors import ControllerError
-from controllers.state import Array
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.certify.certify import certified_rivers
 from experiments.config.run_config import RunConfig
@@ -18,6 +17,7 @@ from experiments.trials.analysis.statistics import RESAMPLES
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
 from experiments.tuning.tune_config import TuneConfig
+from geometry.arrays import Array
 
 GAIN_RATIO = 0.5  # share of the critical gain: Ziegler and Nichols, "Optimum settings for automatic controllers", 1942
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
 from experiments.trials.design.errors import StudyError
@@ -15,6 +14,7 @@ from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import Executor
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning.tune_config import MARGIN, TuneConfig
+from geometry.arrays import Array
 from sim.users.person.population import population
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from controllers.certificates.report import hash_of
 from controllers.checks import check_callable, check_field_types, check_kind, numbers_of
 from controllers.errors import ParameterError
-from controllers.state import Array
 from experiments.certify.certify_simulation import certify
 from experiments.config.keywords import with_keyword_messages
 from experiments.files.given_path import given_path
@@ -21,6 +20,7 @@ from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
 from experiments.trials.design.study_config import MAX_TRIALS, check_trials
+from geometry.arrays import Array
 
 Cost = Callable[[Run], float | Sequence[float]]
 

@@ -10,7 +10,7 @@ wrong sign.
 import numpy as np
 from numba import njit
 
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.phantom.kinematics import Matrix3, Scalars3, Vec3
 from models.phantom.parameters import PREMIUM_1_5
 

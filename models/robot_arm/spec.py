@@ -5,7 +5,7 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 
 ARM_JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 TOOL = "tool"

@@ -7,7 +7,7 @@ but they accept neither a block of a larger matrix nor a column of several right
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit

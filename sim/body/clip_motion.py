@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.quaternions import angular_velocities, with_continuous_signs
 from models.humanoid.skeleton import N_POSE, N_TANGENT
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 
@@ -58,16 +59,11 @@ def clip_motion(clip: Clip, times: Array) -> ClipMotion:
     shape = (n, -1, 4)
     q, dq, ddq = s[:, 3:].reshape(shape), ds[:, 3:].reshape(shape), dds[:, 3:].reshape(shape)
     square = np.sum(q * q, axis=-1, keepdims=True)
-    omega = 2.0 * _relative_vector(q, dq) / square
-    alpha = 2.0 * _relative_vector(q, ddq) / square - 2.0 * np.sum(q * dq, axis=-1, keepdims=True) / square * omega
+    omega = angular_velocities(q, dq) / square
+    alpha = angular_velocities(q, ddq) / square - 2.0 * np.sum(q * dq, axis=-1, keepdims=True) / square * omega
     poses[:, 3:] = (q / np.sqrt(square)).reshape(n, -1)
     velocities[:, 3:], accelerations[:, 3:] = omega.reshape(n, -1), alpha.reshape(n, -1)
     return ClipMotion(times, poses, velocities, accelerations)
-
-
-def _relative_vector(q: Array, r: Array) -> Array:
-    """Vector part of the quaternion product q̄ r, shape (..., 3)."""
-    return q[..., :1] * r[..., 1:] - r[..., :1] * q[..., 1:] - np.cross(q[..., 1:], r[..., 1:])
 
 
 def _frames(clip: Clip, end: float) -> tuple[Array, int]:
@@ -83,7 +79,5 @@ def _frames(clip: Clip, end: float) -> tuple[Array, int]:
     previous_lap = clip.displacement.inverse().moved(lap)
     margin = min(_N_MARGIN_FRAMES, len(lap))
     frames = np.concatenate((previous_lap[len(previous_lap) - margin :], *laps))
-    rotations = frames[:, 3:].reshape(len(frames), -1, 4)
-    flips = np.sign(np.sum(rotations[1:] * rotations[:-1], axis=-1, keepdims=True))
-    rotations[1:] *= np.cumprod(np.where(flips == 0.0, 1.0, flips), axis=0)
+    rotations = with_continuous_signs(frames[:, 3:].reshape(len(frames), -1, 4))
     return np.concatenate((frames[:, :3], rotations.reshape(len(frames), -1)), axis=1), margin

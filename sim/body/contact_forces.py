@@ -17,8 +17,8 @@ Hessians takes a handful of steps however many edges there are, and y is the wre
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
 from sim.body.cholesky import factor, substitute
 
 N_EDGES = 4  # edges of a linearised friction cone

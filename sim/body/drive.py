@@ -13,7 +13,7 @@ from numba.extending import overload
 from controllers.fields.algebra.instructions import VECTOR
 from controllers.kernel_call import call_as_given
 from controllers.lent import Lent, by_pointer
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.body.figure_state import FigureState
 from sim.body.robot import RobotState, robot_torque
 from sim.body.unsimulated import KinematicFigure, NoFigure

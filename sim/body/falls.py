@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
+from geometry.easing import smooth_step
 from models.humanoid.skeleton import DEFAULT_STATURE, FOOT_CONTACTS, HAND_CONTACTS, N_POSE, N_TANGENT
 from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.body.figure_state import FigureState
 
 

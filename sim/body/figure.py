@@ -26,7 +26,7 @@ import numpy as np
 
 from controllers.kernel_call import call_as_given
 from controllers.lent import by_pointer
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import (
     BODIES,
     CONTACT_RADIUS,

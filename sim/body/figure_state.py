@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from controllers.legs.sole_heights import SWING_HEIGHT
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.body.falls import TOUCH_HEIGHT, FallState
 from sim.body.mass_matrix import MassMatrix
 

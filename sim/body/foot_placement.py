@@ -16,9 +16,9 @@ added to the wanted acceleration of the leg, δ' being the solution for the rate
 import numpy as np
 from numba import njit
 
-from controllers.rotations import rotate
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
+from geometry.rotations import rotate
 from sim.body.cholesky import factor, substitute
 from sim.body.figure_state import N_FOOT, FigureState
 from sim.body.stance import N_LEG, cross_add

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 
 class MassMatrix(NamedTuple):

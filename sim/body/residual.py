@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.mocap.preparation.bounds import exceeding_text
 
 MAX_FORCE_RATIO, MAX_MOMENT_RATIO = 0.05, 0.01  # bounds of Hicks et al.: shares of W, and of W h

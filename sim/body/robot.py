@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.robot_arm.spec import ARM_JOINTS, TOOL
 from models.world.scene import PEDESTAL, ROBOT
 from sim.compilation.native import mj_full_m

@@ -14,8 +14,8 @@ tilted is set flat.
 
 from numba import njit
 
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 from sim.body.cholesky import factor, substitute
 
 # κ, weight of contact points at rest against small δ. Half or twice the value changes the residual of walk, run and

@@ -16,8 +16,8 @@ that leaves while the other stands is held too long: a dance has 4.1 % instead o
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT
 from sim.body.figure_state import N_FOOT, REPORT_FLIES, FigureState
 from sim.compilation.native import mj_integrate_pos, mj_kinematics

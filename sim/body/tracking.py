@@ -11,8 +11,7 @@ from numba import typeof, types
 
 from controllers.kernel_call import call_as_given
 from controllers.lent import by_pointer
-from controllers.state import Array, Mask
-from models.arrays import rms
+from geometry.arrays import Array, Mask, rms
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_errors

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.body.figure_state import REPORT_SIZE
 
 

@@ -13,7 +13,7 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.compiled import entry_point
 
 _ADDRESS, _NUMBER = types.uintp, types.int64

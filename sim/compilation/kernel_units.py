@@ -16,8 +16,8 @@ from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers
 from controllers.haptic_map.map_stages import MAP_ARGUMENTS, kernels_of, linked
 from controllers.kernel_call import add_kernel_listener, address_of
-from controllers.state import IntArray
 from controllers.walking.walking import follow_hand
+from geometry.arrays import IntArray
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 
 

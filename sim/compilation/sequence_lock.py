@@ -9,7 +9,7 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 
 _MAX_ATTEMPTS = 20  # limits to microseconds what a reader loses to a writer that stopped while writing

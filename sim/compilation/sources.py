@@ -19,7 +19,7 @@ import llvmlite.binding
 from sim.compilation.unit_cache import cache_folder
 
 _ROOT = Path(__file__).resolve().parents[2]
-_PACKAGES = ("models", "controllers", "sim", "experiments")
+_PACKAGES = ("geometry", "models", "controllers", "sim", "experiments")
 _LIBRARIES = ("casadi", "mujoco", "numba", "numpy", "scipy")
 
 

@@ -13,7 +13,8 @@ from typing import Any, TypeAlias
 
 from numba.extending import overload
 
-from controllers.state import Array, HandState
+from controllers.state import HandState
+from geometry.arrays import Array
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit
 from sim.devices.exchange import Exchange, actuate_exchange, advance_exchange, sense_exchange

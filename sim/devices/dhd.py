@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.safety.faults import Fault, first_not_finite
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.phantom.kinematics import vector_to_device_frame, vector_to_hand_frame
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.c_function import address_of, call_int

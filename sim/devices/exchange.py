@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
+from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME
+from geometry.arrays import Array
 from sim.world.encoders import MEMORY_SIZE, SILENT_PERIODS, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
 from sim.world.plant import Plant, step

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall, keep_arguments
 from sim.compilation.c_function import address_of
 from sim.compilation.memory_access import items

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit, types
 
 from controllers.safety.faults import Fault, first_not_finite
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.c_function import address_for_c, call_struct_head, call_void
 from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import int32_at, loader

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol

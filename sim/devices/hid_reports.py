@@ -12,7 +12,7 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import Fault, first_not_finite
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.devices import hid_protocol as protocol
 from sim.devices.driver import LOST, READ, REFUSED, ROUND_TRIP, TEMPERATURE, note_arrival

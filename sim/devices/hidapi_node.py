@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.c_function import address_of, call_int
 from sim.compilation.compiled import entry_point

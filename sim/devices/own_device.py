@@ -19,7 +19,7 @@ from typing import ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.kinematics import R_HP
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA

@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.faults import READING_NOT_FINITE, READINGS_ENDED, first_not_finite, latch
-from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_TIME, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_QUATERNION, HAND_SIZE, HAND_TIME, HAND_VELOCITY
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.world.encoders import plausibility

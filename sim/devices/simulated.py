@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 from numba import njit
 
-from controllers.state import HAND_TIME, Array
+from controllers.state import HAND_TIME
+from geometry.arrays import Array
 from sim.compilation.units import Unit
 from sim.users.hand.arm import Arm
 from sim.users.person.person_state import PersonState

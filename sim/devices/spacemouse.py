@@ -15,7 +15,8 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from controllers.safety.faults import Fault
-from controllers.state import MAX_TIME_STEP, Array
+from controllers.state import MAX_TIME_STEP
+from geometry.arrays import Array
 from models.phantom.kinematics import R_HP, inside_workspace
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import READ, REFUSED, DeviceIdentity, DriverFault, make_telemetry

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import (
     Quat,

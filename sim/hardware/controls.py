@@ -15,7 +15,7 @@ import numpy as np
 
 from controllers.safety.arming import NO_REQUEST, State
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
 from sim.hardware.process_start import start_without_sigint

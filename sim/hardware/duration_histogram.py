@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 
 BIN = 1e-6  # [s] width of a bin
 _N_BINS = 100_000  # up to 0.1 s; longer times are counted in the last bin

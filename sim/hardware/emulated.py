@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, forward_kinematics, gimbal_reading, vector_to_hand_frame
 from models.world.scene import SceneConfig

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import items

@@ -7,7 +7,8 @@ import numpy as np
 from controllers.safety.arming import CLEAR, NO_REQUEST, State
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, Fault, LatchedFault, latch, latched
 from controllers.safety.gate import GATE_GAIN, GATE_SHARE, GATE_STATE, Gate
-from controllers.state import HAND_TIME, Array
+from controllers.state import HAND_TIME
+from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.memory_access import addresses_of, gather, items
 from sim.devices.driver import JITTER, LOST, REFUSED, ROUND_TRIP, STALENESS, TEMPERATURE, Driver, DriverFault

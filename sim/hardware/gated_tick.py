@@ -11,7 +11,8 @@ from controllers.safety.faults import FAULT_CODE, Fault, latch
 from controllers.safety.gate import GATE_SHARE, GATE_STATE, Gate, pass_gate
 from controllers.safety.limiter import LIMITER_FORCE, THERMAL_TIME
 from controllers.safety.thermal import limit_by_heat
-from controllers.state import HAND_TIME, Array
+from controllers.state import HAND_TIME
+from geometry.arrays import Array
 from models.phantom.dynamics import gravity_torques
 from models.phantom.parameters import PREMIUM_1_5
 from sim.compilation.compiled import entry_point

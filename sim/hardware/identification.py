@@ -38,7 +38,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5

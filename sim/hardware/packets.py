@@ -8,8 +8,8 @@ import socket
 
 from numba import njit, types
 
-from controllers.state import Array
 from controllers.work_array import work_integers
+from geometry.arrays import Array
 from sim.compilation.memory_access import int32_at
 
 _receive = types.ExternalFunction("recv", types.int64(types.int32, types.intp, types.uint64, types.int32))

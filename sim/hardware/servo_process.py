@@ -21,7 +21,7 @@ from numba import types
 from controllers.errors import ControllerError, ParameterError
 from controllers.safety.arming import NO_REQUEST
 from controllers.safety.faults import Fault
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.errors import ModelError
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point

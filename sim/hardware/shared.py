@@ -6,7 +6,7 @@ from typing import Self
 
 import numpy as np
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.sequence_lock import barrier, read_whole, write_whole
 

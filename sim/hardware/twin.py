@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import force_from_torques, forward_kinematics, linkage_angles, vector_to_hand_frame

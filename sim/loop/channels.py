@@ -14,8 +14,8 @@ from controllers.state import (
     HAND_VELOCITY,
     POSITION,
     VELOCITY,
-    Array,
 )
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import pose_errors
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState

@@ -5,7 +5,8 @@ from numba import njit
 
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers, feed_walkers
-from controllers.state import HAND_POSITION, HAND_SWITCH, Array
+from controllers.state import HAND_POSITION, HAND_SWITCH
+from geometry.arrays import Array
 from sim.compilation.compiled import entry_point
 from sim.loop.servo import Field
 

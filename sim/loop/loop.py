@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.fields.algebra.instructions import TRACE_SIZE
-from controllers.state import Array, HandState
+from controllers.state import HandState
+from geometry.arrays import Array
 from sim.devices.device import available_ticks, read_device
 from sim.errors import SimError
 from sim.loop.channels import configuration_size

@@ -32,7 +32,7 @@ from controllers.safety.command import command_force
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank, reset_tank
 from controllers.safety.faults import FAULT_CODE, FAULT_GAPS, FAULT_VALUE, rearm
 from controllers.safety.limiter import ForceLimiter, renew_limiter
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.body.drive import BodyState, follow, follow_addresses
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import law_units, linked_stages, linked_walkers

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from llvmlite.binding import get_host_cpu_name
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.recording.recording import RESERVED, RecordingError, dataset_of, group_of
 from sim.recording.unclosed import lock_for_writing
 

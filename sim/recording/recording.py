@@ -16,7 +16,7 @@ from typing import Self, TypeVar
 import h5py
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.recording.unclosed import AsClosed, has_writer, superblock
 

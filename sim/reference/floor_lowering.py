@@ -19,11 +19,11 @@ import math
 import numpy as np
 from numba import njit, types
 
-from controllers.easing import cubic_step
 from controllers.legs.floor import SOFTNESS
 from controllers.legs.footsteps import lever, limb_end
 from controllers.legs.limbs import LIMB_SIZE
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import cubic_step
 from models.humanoid.skeleton import CONTACT_RADIUS
 from sim.compilation.compiled import entry_point
 from sim.compilation.units import Unit

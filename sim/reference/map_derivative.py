@@ -6,7 +6,7 @@ from numba import types
 from controllers.fields.algebra.instructions import VECTOR
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import linked_stages
 from sim.compilation.units import Unit

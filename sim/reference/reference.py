@@ -13,7 +13,7 @@ from controllers.haptic_map.river_clips import river_clips_map
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB_SIZE
 from controllers.lent import Lent, by_pointer
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import linked_stages
 from sim.compilation.units import Unit

@@ -6,7 +6,7 @@ from numba import njit
 
 from controllers.haptic_map.map_stages import evaluate_map
 from controllers.haptic_map.river_memory import absorb_excess_pace
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.reference.stylus_filter import extrapolate_orientation
 from sim.reference.transition import Transition, apply_transition_to_pose
 

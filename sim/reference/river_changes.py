@@ -27,8 +27,8 @@ from controllers.haptic_map.river_memory import (
 )
 from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_distance
-from controllers.rotations import rotate
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.rotations import rotate
 from sim.reference.reference_state import CompiledReference, apply_transition, evaluate_around_in_river
 from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
 from sim.reference.waiting import has_waited_enough, is_leaping, is_standing

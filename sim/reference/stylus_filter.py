@@ -17,8 +17,8 @@ Without the bound 2π the noise of a slow hand rotates the prediction: the run i
 import numpy as np
 from numba import njit
 
-from controllers.rotations import exponential, logarithm, multiply, relative
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.rotations import exponential, logarithm, multiply, relative
 
 _NOISE_SPEED = 0.02  # v₀ [m/s]: below this speed the direction of motion is encoder noise
 _MAX_TURN_RATE = 2.0 * np.pi  # [rad/s]: no lap takes less than a second; faster turning of a slow hand is noise

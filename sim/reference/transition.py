@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step
 from controllers.legs.footsteps import MAX_CONTINUED_ACCELERATION, STEP, limb_end, pivot, plan_steps, step_end
 from controllers.legs.stepping_limbs import required_root_lowering, solve_stepping_limb
 from controllers.motion.inertialization import add_offset, decaying_offset
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 from sim.compilation.native import mj_differentiate_pos
 
 DWELL_TIME = 0.04  # [s] dwell time of a river before its clip plays: unfiltered noise changes the river every 23 ms

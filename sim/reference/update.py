@@ -18,7 +18,7 @@ from controllers.haptic_map.river_memory import (
     is_taken_over,
     phase_rate,
 )
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.native import mj_differentiate_pos
 from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
 from sim.reference.reference_state import (

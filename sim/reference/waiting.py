@@ -6,7 +6,7 @@ waits until the figure stands and the new motion has no flight within the transi
 
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.reference.floor_lowering import clearance
 from sim.reference.transition import DWELL_TIME, Transition
 

@@ -3,7 +3,7 @@
 import mujoco
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.viewer.palette import TUBE, rgb
 from sim.viewer.shapes import Shape
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.viewer.palette import CURVE, TUBE, river_colors
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.recording.recording import Channel
 
 TRAVEL = 1.5  # [m] a figure that leaves this radius is followed

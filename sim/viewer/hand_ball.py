@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.viewer.live_stage import drawn_at, workspace_position
 from sim.viewer.palette import USER, rgb
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.world.scene import P_WH
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.courses import Course

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 FIELD = "#22a046"  # the field and what it leads
 USER = "#eb7814"  # the hand's own force, and the path where it pushes

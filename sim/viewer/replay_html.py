@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor

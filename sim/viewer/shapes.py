@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
 
 TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside

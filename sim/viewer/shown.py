@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Moment(NamedTuple):

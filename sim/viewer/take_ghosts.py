@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT, GHOST_CELL, drawn_at
 from sim.viewer.palette import RIVERS, rgb

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 FIELD_OF_VIEW = np.deg2rad(34.0)  # vertical [rad]: a ball at the upper edge is drawn 1/cos 17°, 5 % longer than wide
 PANEL = 335.0  # [px] width of viser's panel

@@ -24,8 +24,9 @@ from controllers.state import (
     HAND_SWITCH,
     HAND_TIME,
     HAND_VELOCITY,
-    Array,
 )
+from geometry.arrays import Array
+from geometry.rotations import multiply
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,
@@ -144,17 +145,11 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
 def _update_angular_velocity(hand: Array, q: tuple[float, float, float, float], keep: float, period: float) -> None:
     """Low-pass the angular velocity in H, 2 vec(q q̄_last) / T for the small rotation of one period."""
     last = HAND_QUATERNION
-    w, x, y, z = hand[last], -hand[last + 1], -hand[last + 2], -hand[last + 3]
-    scalar = q[0] * w - q[1] * x - q[2] * y - q[3] * z
-    sign = 2.0 / period if scalar >= 0.0 else -2.0 / period
-    turn = (
-        q[0] * x + q[1] * w + q[2] * z - q[3] * y,
-        q[0] * y - q[1] * z + q[2] * w + q[3] * x,
-        q[0] * z + q[1] * y - q[2] * x + q[3] * w,
-    )
+    turn = multiply(q[0], q[1], q[2], q[3], hand[last], -hand[last + 1], -hand[last + 2], -hand[last + 3])
+    sign = 2.0 / period if turn[0] >= 0.0 else -2.0 / period
     for i in range(3):
         rate = HAND_ANGULAR_VELOCITY + i
-        hand[rate] = keep * hand[rate] + (1.0 - keep) * sign * turn[i]
+        hand[rate] = keep * hand[rate] + (1.0 - keep) * sign * turn[1 + i]
 
 
 @njit

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.safety.faults import HELD, NO_SEQUENCE, elapsed, judge_reading
-from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME, Array
+from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME
+from geometry.arrays import Array
 from models.phantom.kinematics import (
     encoder_reading,
     forward_kinematics,

@@ -8,7 +8,7 @@ from numba import njit
 from controllers.kernel_call import call_as_given
 from controllers.lent import by_pointer
 from controllers.safety.faults import is_silent
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM
 from sim.compilation.native import mj_step

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from models.phantom.kinematics import gimbal_angles, inverse_kinematics, linkage_angles, vector_to_device_frame
 from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS
 from models.world.scene import PHANTOM

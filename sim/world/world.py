@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias, get_args
 import mujoco
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.phantom.kinematics import (
     Quat,

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from controllers.borrowed import without_refcount
-from controllers.state import Array
+from geometry.arrays import Array
 from tests.controllers.array_lifetimes import ArrayLifetimes
 
 

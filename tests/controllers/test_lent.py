@@ -9,7 +9,7 @@ from numba.core.errors import TypingError
 
 from controllers.kernel_call import address_of, call_as_given
 from controllers.lent import Lent, by_pointer
-from controllers.state import Array
+from geometry.arrays import Array
 from tests.controllers.array_lifetimes import ArrayLifetimes
 
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.state import Array
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.setups.modes.lead import walker_argument
 from experiments.setups.parts.led_figure import led_map
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, load_clip, read_motion
 from sim.loop.loop import Loop

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.live import driver
 from experiments.live.session.take_mix import FPS, TakeData
+from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT

@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from models.floor import FRICTION, add_floor
+from geometry.physics import FRICTION
+from models.floor import add_floor
 
 MASS, RADIUS = 10.0, 0.02
 

@@ -6,12 +6,12 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from controllers import rotations
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force
 from controllers.fields.river import window
 from controllers.safety.limiter import force_ceiling
+from geometry import rotations
 
 casadi.GlobalOptions.setNumpyMode(1)
 RNG = np.random.default_rng(5)

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.gravity import GRAVITY
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point

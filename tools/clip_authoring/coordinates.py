@@ -7,10 +7,10 @@ root may rotate by a full turn (a backflip) if it does so about one axis.
 
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import pose_difference
 
 # Step of the finite differences for angular velocity and acceleration [s]. Half or twice the step changes the

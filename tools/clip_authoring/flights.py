@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.motion.clip import Clip
 from tools.clip_authoring.coordinates import coordinate, poses, reflection

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, soles
 from models.mocap.motion.clip import Clip
 from tools.clip_authoring.coordinates import coordinate, poses, reflection

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import Floor, RequiredWrench, residual

@@ -25,8 +25,8 @@ from controllers.certificates.flight.flight_fit import (
 from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.certificates.report import Outcome, Verdict
 from controllers.errors import ParameterError
-from controllers.gravity import GRAVITY
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 
 _MIN_GRAVITY_RATIO = 0.12  # of g: a slower fall, to be played at over 2.9 times its speed, is hardly a slowed recording
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from controllers.certificates.flight.flight_fit import COM_NOISE
 from controllers.certificates.flight.tolerance import ContactTolerance
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)

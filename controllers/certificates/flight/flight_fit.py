@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from controllers.gravity import GRAVITY
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 
 COM_NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 MIN_FLIGHT_FRAMES = 5  # frames of a flight: two more than a parabola has coefficients

@@ -22,8 +22,8 @@ import numpy as np
 from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement
 from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
-from controllers.gravity import GRAVITY
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.physics import GRAVITY
 
 ANY_RATE = 100.0  # a larger admissible rate is no practical bound
 _WINDOW = 0.2  # [s] window of the local parabolas whose second derivative is the acceleration

@@ -21,8 +21,8 @@ import numpy as np
 
 from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.errors import ControllerError, ParameterError
-from controllers.gravity import GRAVITY
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 
 # Tried on SNU's backflip, which is repaired to a duration of 2.73 s with shifts of up to 11.4 cm. Each comment ends
 # with the result for half and for twice the number.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.gravity import GRAVITY
+from geometry.physics import FRICTION, GRAVITY
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class JudgementCriteria:
     tolerance : BallisticTolerance
         Tolerances of flights.
     friction : float
-        Coefficient of friction of soles on the floor; 0.9 is that of the scene.
+        Coefficient of friction of soles on the floor; by default that of the scene.
     contact : ContactTolerance
         Tolerances of contacts between flights.
 
@@ -114,7 +114,7 @@ class JudgementCriteria:
     """
 
     tolerance: BallisticTolerance = field(default_factory=BallisticTolerance)
-    friction: float = 0.9
+    friction: float = FRICTION
     contact: ContactTolerance = field(default_factory=ContactTolerance)
 
     def __post_init__(self) -> None:

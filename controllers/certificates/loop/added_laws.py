@@ -13,7 +13,7 @@ from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.stability import N_PHASES, River
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.errors import ControllerError
-from controllers.state import Array
+from geometry.arrays import Array
 
 # Phases of the curve at which a law is linearised: 20 times as many as those of the loop, since a case may hold on only
 # a short part of the curve.

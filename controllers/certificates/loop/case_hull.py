@@ -24,7 +24,7 @@ from scipy.optimize import linprog
 from controllers.certificates.loop.law_cases import Case, Cases
 from controllers.certificates.loop.symbolic_execution import Condition
 from controllers.errors import ControllerError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _EXCESS_TOLERANCE = 1e-9  # [N] smaller than any force: the rounding error of an excess
 _SLOPE_TOLERANCE = 1e-9  # fraction of the largest slope below which two slopes count as equal

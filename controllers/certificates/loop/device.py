@@ -6,7 +6,8 @@ from typing import Any
 
 import casadi
 
-from controllers.state import Array, Vec3
+from controllers.state import Vec3
+from geometry.arrays import Array
 
 casadi.GlobalOptions.setNumpyMode(1)
 

@@ -28,7 +28,7 @@ from controllers.certificates.report import Verdict
 from controllers.fields.follow import PACE_RANGE
 from controllers.fields.river import window
 from controllers.safety.energy_tank import river_power
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Drag(NamedTuple):

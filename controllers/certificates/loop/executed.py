@@ -20,7 +20,8 @@ from controllers.certificates.loop.stability import River
 from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
-from controllers.state import Array, HandState, Mask
+from controllers.state import HandState
+from geometry.arrays import Array, Mask
 
 _STEP = 1e-6  # [rad], [rad/s] step of the differences
 # Forward and backward steps of two sizes; all give the same slope where the force has a derivative. The slope of a

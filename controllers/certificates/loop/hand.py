@@ -9,7 +9,7 @@ import numpy as np
 from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
 from controllers.checks import check_field_types
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _MAX_MASS = 1e3  # [kg] more than any hand, and small enough for accurate eigenvalues of the loop
 

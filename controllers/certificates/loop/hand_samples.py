@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array, HandState
+from controllers.state import HandState
+from geometry.arrays import Array
 
 HANDS = 50  # states of the hand at which a law is compared with its expression
 MIN_DISTANCE, MAX_DISTANCE = (

@@ -24,7 +24,7 @@ import numpy as np
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
-from controllers.state import Array
+from geometry.arrays import Array
 
 BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; what the skin feels
 

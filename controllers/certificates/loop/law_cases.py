@@ -22,7 +22,8 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import FunctionLaw
-from controllers.state import Array, HandState, Mask
+from controllers.state import HandState
+from geometry.arrays import Array, Mask
 
 MAX_CASES = 16  # largest number of paths through a function: that of four independent comparisons
 # Relative difference of two forces from the same operations in another order: rounding, magnified by cancellation.

@@ -20,8 +20,8 @@ from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.sampled_loop import UNDELAYED_SIZE, SampledLoop
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.fields.leading import leading_force
-from controllers.state import Array
 from controllers.walking.walker import walker_acceleration
+from geometry.arrays import Array
 
 _EDGE_OFFSET = 1e-9  # [m] on the floor: distance from the edge, on the side where the spring acts
 _INACTIVE_WIDTH = 10.0  # [m] width of a dead band for a spring that does not act

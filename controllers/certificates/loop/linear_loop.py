@@ -15,7 +15,7 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.laws import Law, torque_function
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _STIFFNESS_TOLERANCE = 1e-6  # fraction of a law's largest stiffness below which a stiffness counts as zero
 

@@ -19,7 +19,7 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, counterexample
 from controllers.certificates.report import Verdict
-from controllers.state import Array
+from geometry.arrays import Array
 
 DIRECTIONS = 24  # directions across the curve, over half a turn; half or four times as many need the same damping
 # Number of frequencies up to the Nyquist frequency, where most damping is needed; a quarter as many give the same.

@@ -14,7 +14,7 @@ import numpy as np
 
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.state import Array
+from geometry.arrays import Array
 
 _PADE_ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
 PLANT, UNDELAYED_SIZE = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques

@@ -16,7 +16,7 @@ from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import MAX_DELAY_PERIODS, Sampling
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 _MIN_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
 GAIN_GRID = (

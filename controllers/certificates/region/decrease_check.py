@@ -8,7 +8,7 @@ import numpy as np
 from controllers.certificates.interrupts import raise_lost_interrupts
 from controllers.certificates.region.intervals import bounds
 from controllers.certificates.region.lyapunov import PARAMETERS, Axis, Cell, Form, decrease
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Checked(NamedTuple):

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.certificates.report import CertificateError
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Interval(NamedTuple):

@@ -35,7 +35,7 @@ import casadi as ca
 import numpy as np
 
 from controllers.certificates.interrupts import raise_lost_interrupts
-from controllers.state import Array
+from geometry.arrays import Array
 
 TAYLOR_TERMS = 12  # terms of the exponential series over a period: the remainder is below 1e-9 while b_h T/μ < 1
 LENGTH_SCALE = 0.01  # [m] scale of the forms, for conditioning

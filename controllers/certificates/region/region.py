@@ -24,7 +24,7 @@ from controllers.certificates.region.remainder import Course, Remainder, remaind
 from controllers.certificates.region.tube_bounds import TubeBounds, tube_bounds
 from controllers.certificates.report import CertificateError, Verdict
 from controllers.fields.algebra.window import window
-from controllers.state import Array
+from geometry.arrays import Array
 
 # [m], [m/s] limits of a region, beyond which the bounds on the remainder grow too fast. The demo's region reaches
 # 5.0 mm and 0.125 m/s. With twice the first, or half the second, no form suits all its hands; with half the first it

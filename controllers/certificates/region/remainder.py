@@ -17,7 +17,7 @@ from controllers.certificates.loop.laws import Law
 from controllers.certificates.region.lyapunov import Axis, Cell, Form
 from controllers.certificates.region.tube_bounds import TubeBounds
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
+from geometry.arrays import Array
 
 # Factor for terms of second order in T. From 5 mm off the demo's curve a hand comes within 1.8 mm, with 1.1 too; with
 # 1 it comes within 1.65 mm.

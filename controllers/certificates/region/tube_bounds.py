@@ -16,7 +16,7 @@ from controllers.certificates.loop.device import Device, matrix, vector
 from controllers.certificates.region.intervals import bounds, spectral_bound
 from controllers.certificates.report import CertificateError
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
+from geometry.arrays import Array
 
 SEGMENTS = 48  # of the curve: with 48 the bound on the demo's largest mass is 0.151 kg, with 24 0.179, with 96 0.145
 PARTS = 8  # of a segment's box along each joint: with 4 this bound is 0.184 kg, with 16 0.143 at five times the time

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 _ROUNDING = 10.0  # safety factor of the bound on rounding errors of a product of three matrices and its spectrum
 

@@ -38,7 +38,7 @@ from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common
 from controllers.curves.closest_point import closest_phases
 from controllers.fields.algebra.window import window
-from controllers.state import Array
+from geometry.arrays import Array
 
 CORE = 0.1  # fraction of a tube's radius within which the hysteresis bounds the dwell time
 # Steepest ε/σ · d√g/dd in the core.

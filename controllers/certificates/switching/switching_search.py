@@ -17,7 +17,8 @@ from controllers.certificates.loop.stability import River
 from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
-from controllers.state import Array, HandState
+from controllers.state import HandState
+from geometry.arrays import Array
 
 LOST = 0.02  # [s] without an active river after which a hand counts as thrown out
 EARLIER, SECONDS = 0.6, 1.3  # [s] time by which a hand starts before the rivers meet, and duration of its simulation

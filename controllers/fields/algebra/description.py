@@ -13,7 +13,7 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.map_stages import kernels_of
-from controllers.state import Array
+from geometry.arrays import Array
 
 _MAX_LISTED = 16  # largest array that is listed; a larger one is described by a hash
 

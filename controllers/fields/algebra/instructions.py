@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit, types
 
 from controllers.curves.trajectory import curve_point
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Join(IntEnum):

@@ -28,8 +28,9 @@ from controllers.fields.algebra.walker_feed import WalkerFeed, Walkers, feed_wal
 from controllers.fields.algebra.weights import WEIGHT_SIZE, Weight
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
-from controllers.state import HAND_POSITION, HAND_SIZE, Array, HandState, IntArray, Wrench
+from controllers.state import HAND_POSITION, HAND_SIZE, HandState, Wrench
 from controllers.walking.walking import follow_hand
+from geometry.arrays import Array, IntArray
 
 
 class Law(ABC):

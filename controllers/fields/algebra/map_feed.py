@@ -12,7 +12,8 @@ from numba import njit
 from controllers.fields.algebra.law import MapFeed
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
-from controllers.state import HAND_POSITION, Array, IntArray
+from controllers.state import HAND_POSITION
+from geometry.arrays import Array, IntArray
 
 
 class _Column(IntEnum):

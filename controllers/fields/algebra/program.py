@@ -23,8 +23,8 @@ from controllers.fields.algebra.instructions import (
 )
 from controllers.fields.algebra.weights import blend, gate, limit
 from controllers.kernel_call import kernel_call
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 _call = kernel_call(LAW_ARGUMENTS)
 

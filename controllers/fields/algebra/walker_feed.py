@@ -12,8 +12,8 @@ from numba import njit
 
 from controllers.fields.algebra.instructions import LAW_ARGUMENTS
 from controllers.kernel_call import kernel_call
-from controllers.state import Array, IntArray
 from controllers.walking.walking import Walking
+from geometry.arrays import Array, IntArray
 
 _call = kernel_call(LAW_ARGUMENTS)
 

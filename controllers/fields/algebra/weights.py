@@ -8,11 +8,12 @@ import numpy.typing as npt
 from numba import njit
 
 from controllers.checks import check_kind, checked, numbers_of
-from controllers.easing import smooth_step
 from controllers.errors import ParameterError
 from controllers.fields.algebra.window import window
 from controllers.safety.limiter import magnitude
-from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 
 _MIN_RADIUS = 1e-9  # [m] smallest radius of a ball; a smaller one would never contain a hand
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)

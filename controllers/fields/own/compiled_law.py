@@ -14,7 +14,8 @@ from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.instructions import Kernel
 from controllers.fields.algebra.law import Program
 from controllers.fields.own.function_law import FunctionLaw, place_of
-from controllers.state import Array, HandState, Wrench, hand_state
+from controllers.state import HandState, Wrench, hand_state
+from geometry.arrays import Array
 
 _NUMBER = types.float64
 _HAND = types.NamedTuple(

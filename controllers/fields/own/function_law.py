@@ -15,7 +15,8 @@ from controllers.checks import fits_float
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.description import code_digest
 from controllers.fields.algebra.law import Law
-from controllers.state import Array, HandState, Wrench
+from controllers.state import HandState, Wrench
+from geometry.arrays import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

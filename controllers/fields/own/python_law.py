@@ -7,7 +7,7 @@ from numba import njit
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.fields.algebra.law import Program, PythonFeed
 from controllers.fields.own.function_law import FunctionLaw
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit

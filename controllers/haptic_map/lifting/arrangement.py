@@ -20,11 +20,11 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.sparse import csr_array
 
-from controllers.easing import cubic_steps
 from controllers.haptic_map.lifting.layouts import on_lattice, scaled
 from controllers.haptic_map.lifting.room import Rectangle
 from controllers.haptic_map.lifting.transitions import Transition
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import cubic_steps
 
 ROWS = 64  # control points round the lap
 _SAMPLES_PER_ROW = 3

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from controllers.blending.alignment import MAX_LEAD
-from controllers.easing import smooth_steps
 from controllers.haptic_map.lifting.motion_features import Features, Motion, squared_distances
 from controllers.motion.time_warping import least_cost_lead, smooth_lead
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 
 SAMPLES = 385  # samples of a motion's features over its duration
 _STEPS = 96  # steps of the lap in the dynamic programme

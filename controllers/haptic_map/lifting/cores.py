@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.splines import periodic_interpolation
-from controllers.easing import smooth_step
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_step
 
 # [m] largest core radius: h_* of walk, run, jump and backflip changes by 12 % per millimetre, with half or twice the
 # radius by 11 or 13 %.

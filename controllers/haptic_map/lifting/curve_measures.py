@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, evaluate_sites
 from controllers.haptic_map.lifting.transitions import Transition
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class CurveMeasure(NamedTuple):

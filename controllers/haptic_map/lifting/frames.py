@@ -17,7 +17,6 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
 from controllers.motion.channels import closing_signs, normalise, signed_like
 from controllers.motion.loops import (
@@ -25,10 +24,11 @@ from controllers.motion.loops import (
     periodic_remainder,
     placed_at_origin,
     plane_exponential,
-    rotate_about_vertical,
     rotate_in_plane,
 )
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
+from geometry.quaternions import about_axis, product
 
 CLOSES = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
 LEAST_GAP = 0.05  # [rad] least gap that an open clip must leave in the lap
@@ -163,7 +163,7 @@ class PlacedClip:
         # At the angle θ₀ the drift has already moved the figure by the share θ₀/2π of a lap.
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
         placed[:, :2] = rotate_in_plane(heading, placed[:, :2]) + shift
-        placed[:, 3:7] = rotate_about_vertical(heading, placed[:, 3:7])
+        placed[:, 3:7] = product(about_axis(2, heading), placed[:, 3:7])
         return PlacedClip(placed, angles, closed, drift)
 
     @property

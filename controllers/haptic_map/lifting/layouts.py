@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from controllers.haptic_map.lifting.room import Rectangle
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 def lattice(rectangle: Rectangle, separation: float) -> Array:

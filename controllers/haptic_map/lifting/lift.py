@@ -21,7 +21,7 @@ from controllers.haptic_map.lifting.layouts import lattice
 from controllers.haptic_map.lifting.motion_features import Features, Motion, features
 from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import Comparison, Transition, compare, find_transitions, same_motions
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
 
 _MIN_FRAMES = 4  # frames that a cubic spline needs
 

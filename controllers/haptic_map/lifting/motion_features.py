@@ -16,7 +16,8 @@ from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
 from controllers.motion.loops import checked_clip
-from controllers.state import Array, Mask
+from geometry.arrays import Array, Mask
+from geometry.quaternions import angular_velocities
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +113,7 @@ def features(motion: Motion, weights: Array, samples: int) -> Features:
     value, rate = np.asarray(spline(t)), np.asarray(spline(t, 1))
     q, dq = value[:, 3:].reshape(samples, -1, 4), rate[:, 3:].reshape(samples, -1, 4)
     norm = np.linalg.norm(q, axis=2, keepdims=True)
-    matrix, spin = _rotation_matrices(q / norm), _local_velocities(q / norm, dq / norm) * weights[:, None]
+    matrix, spin = _rotation_matrices(q / norm), angular_velocities(q / norm, dq / norm) * weights[:, None]
     root = matrix[:, 0]
     tilt = weights[0] * root[:, 2, :]
     turns = (matrix[:, 1:] * (weights[1:, None, None] / np.sqrt(2.0))).reshape(samples, -1)
@@ -134,12 +135,6 @@ def _rotation_matrices(q: Array) -> Array:
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def _local_velocities(q: Array, dq: Array) -> Array:
-    """Local angular velocities 2 Im(q⁻¹ ⊗ q̇), shape (..., 3)."""
-    vector = q[..., :1] * dq[..., 1:] - dq[..., :1] * q[..., 1:] - np.cross(q[..., 1:], dq[..., 1:])
-    return 2.0 * vector
 
 
 def squared_distances(a: Array, b: Array) -> Array:

@@ -20,10 +20,10 @@ import numpy as np
 from numba import njit
 from scipy.spatial import KDTree
 
-from controllers.curves.splines import basis, basis_slope, control_points
+from controllers.curves.splines import control_points, interpolate
 from controllers.haptic_map.lifting.cores import core_points
-from controllers.state import Array, IntArray
 from controllers.work_array import work_array
+from geometry.arrays import Array, IntArray
 
 SITE = 4  # channels of a site: r, z, R, and the core b
 
@@ -70,19 +70,13 @@ def near_clips(numbers: Array, angle: float, r: float, z: float, clips: IntArray
     rows, total, cells = int(numbers[_ROWS]), int(numbers[_CLIPS]), int(numbers[_CELLS])
     s = angle * rows / (2.0 * np.pi)
     row = min(int(s), rows - 1)
-    b0, b1, b2, b3 = basis(s - row)
-    c0, c1, c2, c3 = basis_slope(s - row)
-    rate = rows / (2.0 * np.pi)
     at = _OFFSETS + row * cells * cells + _cell_index(numbers, r, z)
     control = _OFFSETS + rows * cells * cells + 1
-    p0, stride, count = control + row * total * SITE, total * SITE, 0
+    count = 0
     for n in range(int(numbers[at]), int(numbers[at + 1])):
         clip = int(numbers[n])
-        for k in range(SITE):
-            p = p0 + clip * SITE + k
-            v0, v1, v2, v3 = numbers[p], numbers[p + stride], numbers[p + 2 * stride], numbers[p + 3 * stride]
-            sites[count, k] = b0 * v0 + b1 * v1 + b2 * v2 + b3 * v3
-            slopes[count, k] = rate * (c0 * v0 + c1 * v1 + c2 * v2 + c3 * v3)
+        first = control + (row * total + clip) * SITE
+        interpolate(numbers[first:], total * SITE, s - row, rows / (2.0 * np.pi), sites[count], slopes[count])
         dr, dz = r - sites[count, 0], z - sites[count, 1]
         if dr * dr + dz * dz + _DISTANCE_ROUNDING * _DISTANCE_ROUNDING < sites[count, 2] * sites[count, 2]:
             clips[count] = clip

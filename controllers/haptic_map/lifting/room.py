@@ -8,7 +8,7 @@ import numpy as np
 from controllers.checks import check_field_types, checked
 from controllers.curves.cylinder import checked_interval
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 class Rectangle(NamedTuple):

@@ -4,7 +4,7 @@ import numpy as np
 
 from controllers.curves.splines import control_points, periodic_interpolation
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 
 _MIN_ROWS = 8
 _MIN_RADIUS = 2e-3  # [m] least distance of the clamped stylus from the axis

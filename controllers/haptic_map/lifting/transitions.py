@@ -14,7 +14,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifting.motion_features import Features
-from controllers.state import Array, IntArray, Mask
+from geometry.arrays import Array, IntArray, Mask
 
 SAME_POSE_DISTANCE = 0.02  # mean mismatch over the lap up to which two clips count as the same motion
 # [rad] least distance between two transitions of one clip. With half of it backflip has transitions to both jump and

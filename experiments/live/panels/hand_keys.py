@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import viser
 
-from controllers.state import Array
 from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
+from geometry.arrays import Array
 
 STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
 RELEASE_KEY = "H"

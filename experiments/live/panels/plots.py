@@ -6,8 +6,8 @@ import numpy as np
 import viser
 from viser import uplot
 
-from controllers.state import Array
 from experiments.live.session.desk import numbers
+from geometry.arrays import Array
 from sim.viewer.palette import FIELD, TUBE, USER
 
 SECONDS = 12.0  # [s] that are plotted

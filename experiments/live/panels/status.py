@@ -3,8 +3,8 @@
 import html
 
 from controllers.safety.faults import Fault
-from controllers.state import Array
 from experiments.live.session.desk import Desk
+from geometry.arrays import Array
 
 FIRST_STEPS = """
 - **Drag the orange ball**: it is your hand on the stylus. The stylus lags behind it as a hand feels the field: the

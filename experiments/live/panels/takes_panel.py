@@ -10,13 +10,12 @@ import numpy as np
 import viser
 
 from controllers.errors import ParameterError
-from controllers.state import Array
 from experiments.live.panels import Acts
 from experiments.live.panels.run_panel import configuration_text
 from experiments.live.session.desk import Desk
 from experiments.live.session.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
-from models.arrays import rms
+from geometry.arrays import Array, rms
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.viewer.take_ghosts import COLORS, TakeGhosts

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 _MAX_RETRY_TIME = 1.0  # [s] of a reader; a write is much shorter
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.config.run_config import RunConfig
 from experiments.live.session.engine_process import EngineProcess
 from experiments.live.session.gain_verdict import GainVerdict
@@ -31,6 +30,7 @@ from experiments.live.session.messages import (
     Undo,
 )
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
+from geometry.arrays import Array
 from sim.errors import SimError
 
 HISTORY_DURATION = 60.0  # [s] of history that can be viewed again

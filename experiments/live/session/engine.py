@@ -10,10 +10,11 @@ from controllers.curves.deformation import redo, undo
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Program
 from controllers.fields.stretchy_tubes import StretchyGains, StretchyTubes
-from controllers.state import HAND_SWITCH, POSITION, Array
+from controllers.state import HAND_SWITCH, POSITION
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
 from experiments.setups.setups import parts_of
+from geometry.arrays import Array
 from sim.compilation.compiled import entry_point
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.loop import make_logs

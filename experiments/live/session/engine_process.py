@@ -11,7 +11,7 @@ import numpy as np
 from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE, FAULT_VALUE
-from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
+from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY
 from experiments.live.session.board import Board
 from experiments.live.session.engine import Drag, Engine
 from experiments.live.session.messages import (
@@ -40,6 +40,7 @@ from experiments.live.session.workers import PageProcess
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
 from models.errors import ModelError
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit

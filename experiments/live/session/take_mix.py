@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.easing import smooth_steps
 from controllers.errors import ParameterError
-from controllers.state import Array
 from experiments.results.folder import RECORDING, has_animation
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 from sim.errors import SimError
 from sim.recording.recording import Recording
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.results.measures.summary_parts import FigureSummary
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
 from sim.body.falls import UP
 from sim.body.residual import MIN_GROUND_FORCE, ResidualMeasure

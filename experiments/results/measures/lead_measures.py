@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.state import Array, IntArray
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import PATH_HEADING, path_value
 from controllers.walking.walker import walker_at
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.soles import Soles
+from geometry.arrays import Array, IntArray
+from geometry.quaternions import heading
 from models.humanoid.skeleton import N_POSE
-from models.mocap.motion.quaternions import heading
 from models.world.scene import SceneConfig
 from sim.recording.recording import Recording
 

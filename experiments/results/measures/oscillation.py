@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.safety.oscillation import OscillationDetector, oscillating_ticks
-from controllers.state import Array, Mask
 from experiments.results.measures.blocks import BLOCK_ROWS
 from experiments.results.measures.figure_measure import MeanSquare
+from geometry.arrays import Array, Mask
 from models.phantom.parameters import PREMIUM_1_5
 from sim.recording.recording import Recording
 

@@ -3,7 +3,7 @@ r"""Distances between poses of two animations: geodesic in D = R³ × SO(3)^18, 
 import mujoco
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.mocap.motion.clip import pose_difference
 from models.mocap.motion.kinematics import global_rotations, segment_positions
 

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from controllers.state import Array, Mask
 from experiments.results.folder import has_animation, scene_of
 from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
@@ -25,6 +24,7 @@ from experiments.results.measures.summary_parts import (
     TankSummary,
     TraceSummary,
 )
+from geometry.arrays import Array, Mask
 from models.mocap.motion.clip import pose_difference
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording

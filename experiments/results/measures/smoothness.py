@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
 RATE = 100.0  # [Hz] at which the speed is sampled

@@ -1,7 +1,7 @@
 """Slide and lowest height of the soles, measured from blocks of poses."""
 
 from controllers.legs.sole_heights import STANCE_HEIGHT
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, DEFAULT_STATURE, FOOT_CONTACTS, figure_model
 from models.mocap.motion.foot_skate import ContactSlide
 from models.mocap.motion.kinematics import contact_points

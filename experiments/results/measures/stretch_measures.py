@@ -7,10 +7,10 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
-from controllers.state import Array
 from experiments.results.measures.blocks import ROWS
 from experiments.results.measures.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
 from experiments.results.measures.run_measures import Span, measure_span
+from geometry.arrays import Array
 from sim.recording.recording import Channel, Recording
 
 _PRESS_CHANNELS = ("t", "p", "user", "phase", "nearest", "distance")

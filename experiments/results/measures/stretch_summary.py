@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.fields.stretchy_tubes import StretchyTubes
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from controllers.state import Array, Mask
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from experiments.results.pages.arm_figure import arm_figure
+from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from controllers.state import Array
 from experiments.results.pages.figures import AXES, PALE_TUBE, PALE_USER, STYLE, legend_above
+from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.body.falls import UP
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER

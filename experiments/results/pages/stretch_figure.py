@@ -6,9 +6,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.state import Array
 from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.results.pages.figures import STYLE
+from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 

@@ -6,13 +6,13 @@ from functools import cache, partial
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.motion.strides import fit_to_lap
-from controllers.state import Array
 from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendable, off_pace, same, timing_clip
 from experiments.setups.maps.place import Place
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 
 

@@ -9,7 +9,6 @@ from controllers.blending.clip_arrays import clip_arrays
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
 from controllers.haptic_map.cylindrical import correction_shape
 from controllers.legs.limbs import Limb
-from controllers.state import Array
 from experiments.config.maps import Cylindrical
 from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import cached_array
@@ -22,6 +21,7 @@ from experiments.setups.maps.about_circle import about_circle, motions_of, out_o
 from experiments.setups.maps.place import Place, place_of
 from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.parts.part_types import ClipMapParts
+from geometry.arrays import Array
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.compilation.sources import results_folder
 

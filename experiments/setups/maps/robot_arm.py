@@ -11,12 +11,12 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
-from controllers.state import Array
 from experiments.config.maps import RobotArm
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import check_reach, course_of
 from experiments.setups.parts.part_types import ClipMapParts
+from geometry.arrays import Array
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
 from models.world.scene import PEDESTAL
 from sim.reference.reference import poses_along

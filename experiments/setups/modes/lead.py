@@ -7,7 +7,6 @@ import numpy as np
 from controllers.fields.leading import Leading
 from controllers.haptic_map.led import Led
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array
 from controllers.walking.gait import Gait
 from controllers.walking.walking import Walking
 from experiments.config.modes import Lead
@@ -19,6 +18,7 @@ from experiments.setups.parts.hands import participant
 from experiments.setups.parts.leading_hand import BEND, leading_hand, s_curve
 from experiments.setups.parts.led_figure import LedParts
 from experiments.setups.parts.part_types import Measuring, Notes, Parts
+from geometry.arrays import Array
 from sim.body.figure import FigureGains
 from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent

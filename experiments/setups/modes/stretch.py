@@ -11,7 +11,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.safety.energy_tank import river_power, spring_store
 from controllers.safety.limiter import ForceLimiter
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.config.modes import Stretch, StretchThenFollow
 from experiments.config.run_config import Replay, RunConfig, User
 from experiments.results.measures.stretch_measures import editing_summary, performance_summary
@@ -32,6 +32,7 @@ from experiments.setups.parts.hands import (
     user_hand,
 )
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
+from geometry.arrays import Array
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.spans import spans

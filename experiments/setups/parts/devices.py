@@ -5,11 +5,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from controllers.errors import ParameterError
-from controllers.state import Array
 from experiments.config.run_config import Replay
 from experiments.files.device_files import linkage_of
 from experiments.results.folder import RECORDING
 from experiments.setups.parts.part_types import Settings
+from geometry.arrays import Array
 from sim.devices.device import DeviceState
 from sim.devices.replayed import ReplayedHand, recorded_hand, replayed_hand
 from sim.errors import SimError

@@ -6,7 +6,8 @@ to the motion that she has in mind (`sim.users.person.eye`).
 
 import numpy as np
 
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
+from geometry.arrays import Array
 from models.mocap.motion.clip import pose_difference
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo

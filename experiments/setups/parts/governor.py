@@ -10,9 +10,10 @@ from controllers.fields.governor import Governor
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import change_clip
-from controllers.state import Array, stylus_path
+from controllers.state import stylus_path
 from experiments.config.modes import SpeedGovernor
 from experiments.setups.parts.part_types import ClipMapParts
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 from sim.reference.reference import map_poses
 

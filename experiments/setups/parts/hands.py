@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
 from experiments.config.run_config import User
 from experiments.setups.parts.expression import lap_turns
+from geometry.arrays import Array
 from sim.users.hand.actions import Grab, Push
 from sim.users.hand.arm import Arm
 from sim.users.intents import (

@@ -3,9 +3,9 @@
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import cubic_steps
 from controllers.fields.leading import Leading
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import cubic_steps
 from sim.users.hand.arm import Arm
 
 BEND = 0.25 * np.pi  # each half of the S turns from −45° to 45° or back

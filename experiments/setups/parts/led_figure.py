@@ -10,7 +10,6 @@ from controllers.haptic_map.led import Led
 from controllers.legs.cyclic_runs import runs
 from controllers.legs.limbs import Limb
 from controllers.motion.captures import Capture
-from controllers.state import Mask
 from controllers.walking.gait import Gait
 from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
@@ -19,6 +18,7 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.clips import MIN_FLIGHT_DURATION, load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
+from geometry.arrays import Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, proportion
 from models.mocap.dynamics.contacts import Contacts, contacts
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip

@@ -13,7 +13,7 @@ import numpy as np
 from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.dynamics import coriolis_matrix, mass_matrix
 from models.phantom.kinematics import jacobian, vector_to_device_frame
 from models.phantom.parameters import PREMIUM_1_5

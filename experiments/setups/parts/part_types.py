@@ -13,12 +13,12 @@ from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.sized import Sized
 from controllers.safety.energy_tank import EnergyTank
-from controllers.state import Array
 from controllers.walking.walking import Walking
 from experiments.config.modes import Rivers
 from experiments.config.run_config import Clock, Figure, Phantom, Replay
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.expression import expressive_figure
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.body.figure import FigureGains

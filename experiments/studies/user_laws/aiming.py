@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.studies.user_laws.bare_device import AFTER, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
+from geometry.arrays import Array
 from sim.users.person.person import Person
 from sim.users.person.wishes import targets
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import rest_pose
 from models.world.scene import SceneConfig
 from sim.compilation.compiled import entry_point

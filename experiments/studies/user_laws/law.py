@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @dataclass(frozen=True)

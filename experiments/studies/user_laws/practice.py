@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import curve_fit
 
-from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, trial
 from experiments.studies.user_laws.law import Law, Study
+from geometry.arrays import Array
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following
 

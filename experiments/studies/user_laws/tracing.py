@@ -7,9 +7,9 @@ from scipy.optimize import isotonic_regression
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import norm
 
-from controllers.state import Array
 from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
+from geometry.arrays import Array
 from sim.users.person.pace import natural_times
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 EQUAL_TOLERANCE = 1e-6  # relative spread below which differences count as equal
 

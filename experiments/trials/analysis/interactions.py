@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.trials.analysis.effect_sizes import has_spread
+from geometry.arrays import Array
 
 
 def interactions_of(

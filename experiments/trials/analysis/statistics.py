@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from controllers.state import Array
 from experiments.trials.analysis.effect_sizes import cohen_dz, has_spread, hedges_g
 from experiments.trials.analysis.interactions import interactions_of
 from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL, NO_FIT, Fit, fit_mixed_model
+from geometry.arrays import Array
 
 RESAMPLES = 4999
 """Number of bootstrap resamples; (4999 + 1) × 2.5 % is whole, so that the ends of a percentile interval are resamples

@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 
-from controllers.state import Array, Mask
 from experiments.config.run_config import PERSON_INTENTS, RunConfig
 from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
 from experiments.results.measures.run_measures import SETTLING
@@ -19,6 +18,7 @@ from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk
 from experiments.setups.default_animation import default_poses
 from experiments.setups.session import Session
 from experiments.trials.trial.trial_log import TrialLog
+from geometry.arrays import Array, Mask
 from sim.body.falls import UP
 from sim.body.residual import MIN_GROUND_FORCE
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.body.figure_state import FigureState
 from sim.loop.channels import frame_channels, tick_channels
 from sim.loop.servo import FrameLog, Servo, TickLog

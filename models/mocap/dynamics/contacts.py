@@ -14,7 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.arrays import Array, Mask
+from geometry.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import cleaned, spans

@@ -21,8 +21,8 @@ import mujoco
 import numpy as np
 from scipy.optimize import nnls
 
-from models.arrays import Array, Mask
-from models.floor import FRICTION
+from geometry.arrays import Array, Mask
+from geometry.physics import FRICTION
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT, figure_model
 
 _REGULARISATION = 0.01  # ε: makes the forces unique, shared between spheres, and continuous in the state

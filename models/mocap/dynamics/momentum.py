@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.two_links import reach
 from models.humanoid.skeleton import BODIES, figure_model
-from models.mocap.motion import quaternions
 from models.mocap.motion.kinematics import global_rotations, segment_positions
 
-_MAX_REACH_RATIO = 0.9995  # largest distance from hip to ankle as a share of the leg's length: a knee bent by 3.6°
 _CHAINS = tuple(
     tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
 )
@@ -40,29 +40,21 @@ def displaced_with_planted_feet(poses: Array, shift: Array, planted: Array) -> A
         The new poses. An ankle that would be out of reach is moved towards the hip.
     """
     thigh, shank = _leg_bones()
-    a, b = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
     segments = global_rotations(poses)
     moved = poses.copy()
     moved[:, :3] += shift
     for leg, (first, second, third) in enumerate(_CHAINS):
         upper = quaternions.rotated(segments[:, first], thigh)
         lower = quaternions.rotated(segments[:, second], shank)
-        target = upper + lower - planted[:, leg, None] * shift
-        distance = np.minimum(np.linalg.norm(target, axis=1), _MAX_REACH_RATIO * (a + b))
         axis = np.cross(upper, lower)
         sine = np.linalg.norm(axis, axis=1)
         side = quaternions.rotated(segments[:, first], np.array([0.0, 1.0, 0.0]))
         # A straight knee defines no plane; it bends about the thigh's lateral axis.
-        axis = np.where((sine > 0.03 * a * b)[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
-        knee_angle = np.arctan2(np.sum(np.cross(upper, lower) * axis, axis=1), np.sum(upper * lower, axis=1))
-        target_knee_angle = np.arccos(np.clip((distance**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
-        changed = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
-        bend = _rotation_about(axis, np.where(changed, target_knee_angle - np.abs(knee_angle), 0.0))
-        bent, target_line = (
-            upper + quaternions.rotated(bend, lower),
-            np.where(changed[:, None], target, upper + lower),
-        )
-        swing = quaternions.arcs(_unit(bent), _unit(target_line))
+        bent = sine > 0.03 * np.linalg.norm(thigh) * np.linalg.norm(shank)
+        axis = np.where(bent[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
+        displaced = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
+        bend, swing = reach(upper, lower, axis, upper + lower - planted[:, leg, None] * shift, -1.0)
+        bend, swing = (np.where(displaced[:, None], turn, (1.0, 0.0, 0.0, 0.0)) for turn in (bend, swing))
         new_thigh = quaternions.product(swing, segments[:, first])
         new_shank = quaternions.product(swing, quaternions.product(bend, segments[:, second]))
         for body, parent, child in (
@@ -78,13 +70,3 @@ def _leg_bones() -> tuple[Array, Array]:
     """Thigh and shank in their own frames [m]."""
     model = figure_model()
     return model.body("left_shank").pos, model.body("left_foot").pos
-
-
-def _rotation_about(axis: Array, angle: Array) -> Array:
-    """Rotations about unit axes (n, 3) by angles (n,), shape (n, 4)."""
-    half = angle[:, None] / 2.0
-    return np.concatenate([np.cos(half), np.sin(half) * axis], axis=1)
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

@@ -10,8 +10,8 @@ Feet can only give it inside the support polygon, the convex hull of their conta
 
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.gravity import GRAVITY
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 
 
 def zero_moment_point(com: Array, force: Array, torque: Array) -> Array:

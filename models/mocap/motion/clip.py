@@ -7,10 +7,10 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, Pose
-from models.mocap.motion import quaternions
 
 CLOSURE_TOLERANCE = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""

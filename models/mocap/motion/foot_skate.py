@@ -11,7 +11,7 @@ A point that moves evenly through its contact skates half as far as it slides.
 
 import numpy as np
 
-from models.arrays import Array, Mask
+from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 
 

@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, SEGMENTS, figure_model
-from models.mocap.motion import quaternions
 
 
 def global_rotations(poses: Array) -> Array:

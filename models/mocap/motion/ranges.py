@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import joint_range
-from models.mocap.motion import quaternions
 
 
 def vectors_in_ranges(rotations: Array, low: Array, high: Array) -> Array:

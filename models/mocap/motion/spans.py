@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.arrays import Mask
+from geometry.arrays import Mask
 
 
 def spans(mask: Mask) -> list[tuple[int, int]]:

@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
 from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssue]
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.poses import add_tangents, extend_periodically

@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array, Mask, rms
+from geometry import quaternions
+from geometry.arrays import Array, Mask, rms
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import vectors_in_ranges
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, rms
+from geometry.arrays import Array, rms
+from geometry.quaternions import rotated
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.motion.quaternions import rotated
 from models.mocap.preparation.bounds import exceeding_text
 from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.poses import resampled

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from models.arrays import Array, Mask
+from geometry.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.spans import cleaned, spans
 

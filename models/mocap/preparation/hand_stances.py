@@ -14,7 +14,7 @@ below it. Its place in the schedule is on the floor.
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array, Mask
+from geometry.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.contacts import HAND_REACH, MAX_FILLED_GAP, MIN_STANCE_TIME, contacts
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, Floor

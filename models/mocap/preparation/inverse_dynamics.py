@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array
+from geometry.arrays import Array
+from geometry.quaternions import cross_matrix
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, figure_model
 from models.mocap.dynamics.floor_forces import RequiredWrench, carriers
-from models.mocap.motion.quaternions import cross_matrix
 from models.mocap.preparation.change import State
 
 # Steps of the finite differences [rad], [rad/s]: half or twice either changes the derivatives by at most 6e-6 of them.

@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, IntArray
+from geometry import quaternions
+from geometry.arrays import Array, IntArray
 from models.mocap.dynamics.contacts import contacts
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 
 # Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ matters: half the value loops two of them differently

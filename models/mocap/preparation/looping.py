@@ -12,10 +12,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, IntArray
+from geometry import quaternions
+from geometry.arrays import Array, IntArray
+from geometry.easing import smooth_steps
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.ranges import beyond_ranges
@@ -221,7 +222,7 @@ def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) ->
     if before + after >= 6:
         for k in range(-before, after + 1):
             # 0 is the motion at the lap's end, 1 that at its start (or its mirror image), both at the same place.
-            fade = _smoothstep((k + before) / (before + after))
+            fade = smooth_steps(np.array((k + before) / (before + after)))
             end = inverse.moved(poses[last + k])
             mixed = add_tangents(end[None], fade * pose_difference(end, opening[first + k])[None])
             if k >= 0:
@@ -290,12 +291,6 @@ def _find_half_stride(clip: Clip) -> tuple[int, int, float] | None:
     return (int(inner[i]), int(inner[j]), float(crossed[j, i])) if fits else None
 
 
-def _smoothstep(x: float | Array) -> Array:
-    """S(x) = x³ (10 − 15 x + 6 x²) on [0, 1], 0 before and 1 after; C²."""
-    x = np.clip(x, 0.0, 1.0)
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
 def _with_return(clip: Clip, gap: float) -> LoopedClip:
     """The clip and a way back from its last frame to its first: a quintic in the tangent, with matching velocities."""
     first, last = clip.poses[0] if _has_standing_foot(clip) else clip.displacement.moved(clip.poses[0]), clip.poses[-1]
@@ -306,7 +301,7 @@ def _with_return(clip: Clip, gap: float) -> LoopedClip:
     start, end = speeds[-1], speeds[0]
     x = np.linspace(0.0, 1.0, n + 1)[1:, None]
     # Quintic with the ends' values and velocities and no acceleration.
-    ease = _smoothstep(x)
+    ease = smooth_steps(x)
     leave = x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5
     arrive = -4.0 * x**3 + 7.0 * x**4 - 3.0 * x**5
     way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + leave * start + arrive * end)
@@ -345,7 +340,7 @@ def _come_to_rest(pose: Array, velocity: Array, fps: float, within: bool) -> Arr
     poses = _decay(pose, velocity, times, fps)
     x = np.arange(1, len(poses) + 1) / (fps * longest)
     low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
-    poses[:, 2] -= _smoothstep(x) * low
+    poses[:, 2] -= smooth_steps(x) * low
     return poses
 
 

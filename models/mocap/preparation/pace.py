@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 
 # Cut-off of the low-pass [Hz]; with 6 and 15 Hz the residuals of eight captures are the same to 2 percentage points.

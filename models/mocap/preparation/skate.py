@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.motion.clip import Clip

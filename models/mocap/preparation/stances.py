@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from models.arrays import Array, Mask
-from models.gravity import GRAVITY
+from geometry import quaternions
+from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, soles
 from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points, global_rotations, sole_points
 from models.mocap.motion.spans import cleaned, spans

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.arrays import Array, Mask, rms
-from models.gravity import GRAVITY
+from geometry import quaternions
+from geometry.arrays import Array, Mask, rms
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, JOINTS
 from models.mocap.dynamics.momentum import momentum
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_difference
 from models.mocap.motion.kinematics import global_rotations
 from models.mocap.motion.ranges import beyond_ranges

@@ -13,8 +13,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.readers.motion_file import (
     JOINT_LIMIT,
     MotionFileError,

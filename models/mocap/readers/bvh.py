@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.readers.motion_file import (
     FRAME_LIMIT,
     JOINT_LIMIT,

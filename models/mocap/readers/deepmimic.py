@@ -12,8 +12,8 @@ from typing import NamedTuple, NoReturn, cast
 
 import numpy as np
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 from models.mocap.readers.motion_file import (
     JOINT_LIMIT,
     MAGNITUDE_LIMIT,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import DEFAULT_STATURE, SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array
 
 _MAX_ZERO_ROTATION = 1e-4  # half the largest angle [rad] that counts as zero: files have four decimals
 

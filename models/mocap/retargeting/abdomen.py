@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
 from models.mocap.retargeting.body_lines import BodyLines
 from models.mocap.retargeting.skeleton_roles import Roles, middle_of

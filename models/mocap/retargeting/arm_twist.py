@@ -13,9 +13,9 @@ axis, which positions do determine. Both are zero within the ranges.
 
 import numpy as np
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, joint_range
-from models.mocap.motion import quaternions
 from models.mocap.retargeting.body_lines import SIDES
 
 _LONG_AXIS = 1  # the arms' long axis

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array, Mask
+from geometry.quaternions import unit
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles
@@ -96,12 +97,6 @@ class BodyLines(NamedTuple):
             result[:first] = first > _MIN_PADDING_TIME * fps and slow < steps[first] < fast
             result[last + 1 :] = len(steps) - last > _MIN_PADDING_TIME * fps and slow < steps[last - 1] < fast
         return result
-
-
-def unit(vectors: Array) -> Array:
-    """Unit vectors along vectors of shape (..., 3); NaN where the length is 0."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0.0, length, np.nan)
 
 
 def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: Array) -> BodyLines:

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from models.arrays import Array, Mask
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array, Mask
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 

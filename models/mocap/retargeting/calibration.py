@@ -23,10 +23,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.quaternions import unit
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
-from models.mocap.motion import quaternions
-from models.mocap.retargeting.body_lines import SIDES, BodyLines, unit
+from models.mocap.retargeting.body_lines import SIDES, BodyLines
 from models.mocap.retargeting.segment_frames import frames, with_constant_offset
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 from models.mocap.retargeting.sole_calibration import calibrated_foot, foot_flat_frames

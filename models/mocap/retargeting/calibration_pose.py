@@ -21,10 +21,11 @@ joints that segments of the figure follow.
 
 import numpy as np
 
-from models.arrays import Array, Mask
-from models.mocap.motion import quaternions
+from geometry import quaternions
+from geometry.arrays import Array, Mask
+from geometry.quaternions import unit
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import BodyLines, unit
+from models.mocap.retargeting.body_lines import BodyLines
 from models.mocap.retargeting.broken_frames import MIN_FRAME_COUNT, first_step_jumps, used_joints
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import stdtrit
 
-from models.arrays import Array, IntArray, Mask, rms
+from geometry import quaternions
+from geometry.arrays import Array, IntArray, Mask, rms
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, soles
-from models.mocap.motion import quaternions
 from models.mocap.motion.kinematics import segment_positions
 
 # Largest height difference among the contact points of a level sole [m]: half or twice moves the floor by 1 or 2 mm.

@@ -15,7 +15,7 @@ time, so that flights remain parabolas.
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES
 from models.mocap.motion.kinematics import segment_positions
 from models.mocap.retargeting.body_lines import SIDES

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, Mask, rms
-from models.gravity import GRAVITY
+from geometry.arrays import Array, Mask, rms
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.motion.spans import spans

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
-from models.mocap.retargeting.body_lines import unit
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.quaternions import unit
 
 
 def frames(left: Array, along: Array) -> Array:

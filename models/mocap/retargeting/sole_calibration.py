@@ -4,9 +4,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from models.arrays import Array
-from models.mocap.motion import quaternions
-from models.mocap.retargeting.body_lines import AT_REST, BodyLines, unit
+from geometry import quaternions
+from geometry.arrays import Array
+from geometry.quaternions import unit
+from models.mocap.retargeting.body_lines import AT_REST, BodyLines
 from models.mocap.retargeting.segment_frames import with_constant_offset
 
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry

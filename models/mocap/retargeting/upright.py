@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.arrays import Array, IntArray, Mask
+from geometry.arrays import Array, IntArray, Mask
 from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion

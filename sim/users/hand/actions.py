@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import check_field_types
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.errors import SimError
 
 _PUSH_COLUMNS, _TURN_COLUMNS = 11, 5

@@ -8,8 +8,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.easing import smooth_step, smooth_step_slope
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_step, smooth_step_slope
 from models.phantom.parameters import MIN_TIP_MASS, PREMIUM_1_5
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push, Turn, grab_at, grab_table, push_at, push_table, turn_table

@@ -9,7 +9,7 @@ law is the same as for every simulated hand.
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.users.hand.actions import GRAB_COLUMNS
 from sim.users.hand.arm import CompiledArm
 

@@ -4,9 +4,9 @@ import math
 
 from numba import njit
 
-from controllers.rotations import angular_velocity, exponential, logarithm, multiply
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
+from geometry.rotations import angular_velocity, exponential, logarithm, multiply
 from sim.users.hand.actions import turn_at
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import smooth_steps
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
 from sim.errors import SimError
 from sim.users.person.wishes import Wishes
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.checks import check_kind, numbers_of
 from controllers.curves.trajectory import Trajectory
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.errors import SimError
 from sim.users.intents.intent import PERIOD, moments
 from sim.users.person.wishes import Wishes, following

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from controllers.state import Array
+from geometry.arrays import Array
 from models.phantom.parameters import MIN_TIP_MASS
 from sim.errors import SimError
 from sim.users.person.person import Person

@@ -4,8 +4,8 @@ import math
 
 from numba import njit
 
-from controllers.state import Array
 from controllers.work_array import work_array
+from geometry.arrays import Array
 from sim.users.person.person_state import (
     BEGUN,
     BELIEF,

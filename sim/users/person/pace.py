@@ -8,7 +8,7 @@ r"""The natural timing of a hand along a given closed path: that of minimum jerk
 import numpy as np
 from scipy.optimize import minimize
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 _N_HARMONICS = 6  # Fourier terms of the logarithm of the speed along a lap
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from controllers.state import Array, IntArray
+from geometry.arrays import Array, IntArray
 from sim.users.person.eye import Eye, no_eye
 from sim.users.person.wishes import WISH_SIZE
 

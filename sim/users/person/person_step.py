@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit, typeof, types
 
 from controllers.lent import Lent
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.units import Unit
 from sim.users.person.body import REFERENCE_GRIP
 from sim.users.person.decisions import act_on_wish

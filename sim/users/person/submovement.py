@@ -10,7 +10,7 @@ minimises ∫|x⃛|² between two states (position, velocity, acceleration) in a
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 MAX_SUBMOVEMENTS = 8  # largest number of submovements planned to a target; more would leave 1/2000 of the distance
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, types
 
 from controllers.kernel_call import kernel_call
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.errors import SimError
 
 PLACE, FORCE, GRIP, WIDTH, SWITCH, ENGAGED, WISH_SIZE = 0, 3, 6, 7, 8, 9, 10

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
-from controllers.easing import smooth_step
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import mismatch
 from controllers.state import HandState
+from geometry.easing import smooth_step
 
 CIRCLE = Trajectory.circle(0.05, 4.0)
 RNG = np.random.default_rng(0)

@@ -6,8 +6,8 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.robot_arm import RobotArm
-from controllers.rotations import exponential, multiply
 from experiments.setups.maps.robot_arm import HOME, ORIENTATION, robot_arm_map
+from geometry.rotations import exponential, multiply
 from models.robot_arm.spec import TOOL, arm_lengths, arm_limits, arm_model
 from tests.controllers.clips_for_maps import assert_same_compiled
 from tests.derivatives import extrapolated_differences

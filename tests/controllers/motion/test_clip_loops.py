@@ -6,14 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from controllers.blending.alignment import aligned_channels
 from controllers.errors import ParameterError
-from controllers.motion.loops import (
-    append_reversal,
-    checked_clip,
-    closed_loop,
-    plane_exponential,
-    rotate_about_vertical,
-    rotate_in_plane,
-)
+from controllers.motion.loops import append_reversal, checked_clip, closed_loop, plane_exponential, rotate_in_plane
+from geometry.quaternions import about_axis, product
 from tests.controllers.clips_for_maps import matrices, swinging, wxyz
 
 
@@ -61,7 +55,7 @@ def _curved_walk():
     shift, angle = plane_exponential(s[:, None] * [1.2, 0.1, 0.7])
     poses[:, :2], poses[:, 3:7] = (
         rotate_in_plane(angle, poses[:, :2]) + shift,
-        rotate_about_vertical(angle, poses[:, 3:7]),
+        product(about_axis(2, angle), poses[:, 3:7]),
     )
     return poses
 
@@ -91,7 +85,7 @@ def test_curved_walk_has_a_periodic_remainder():
 def test_closed_loop_keeps_heading_drift_of_spinning_walk(turns):
     poses = swinging(2, travel=1.3)
     s = np.linspace(0.0, 1.0, len(poses))
-    poses[:, 3:7] = rotate_about_vertical((2.0 * np.pi * turns - 0.24) * s, poses[:, 3:7])
+    poses[:, 3:7] = product(about_axis(2, (2.0 * np.pi * turns - 0.24) * s), poses[:, 3:7])
     loop = _loop(poses)
     assert loop.drift[2] == pytest.approx(-0.24, abs=1e-9)
     channels = loop.channels(s, s)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from controllers.gravity import GRAVITY
 from controllers.walking.walked_path import (
     PACKED_PATH,
     PATH_HEADING,
@@ -19,6 +18,7 @@ from controllers.walking.walked_path import (
     path_value,
     straight_path,
 )
+from geometry.physics import GRAVITY
 
 
 def _values(path, arguments, channel):

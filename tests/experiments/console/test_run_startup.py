@@ -29,7 +29,7 @@ field = hvf.Follow(hvf.circle(radius=0.0477, lap=4.0), k_r=300.0, b_d=8.0)
 print(np.linalg.norm(field.wrench(hvf.HandState.at((0.05, 0.0, 0.0)))[0]))
 """
 
-_COMPILES = "from controllers.easing import smooth_step; smooth_step(0.5)"
+_COMPILES = "from geometry.easing import smooth_step; smooth_step(0.5)"
 
 
 @pytest.mark.slow

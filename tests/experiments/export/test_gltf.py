@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from controllers.state import Array
 from experiments.cli import main
+from geometry.arrays import Array
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, pose_difference

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.prepared_file import changes, doubts
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from experiments.preparation.source_deviation import LINES, deviation, deviations, source_of
+from geometry import quaternions
 from models.humanoid.skeleton import JOINTS
 from models.mocap.library import embedded, load
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.looping import close_or_rest
 from models.mocap.preparation.poses import resampled

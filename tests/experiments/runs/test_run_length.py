@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hvf
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.setups.wiring import wire
+from geometry.arrays import Array
 from sim.loop.loop import Loop
 
 CURVE = hvf.circle(lap=2.0)

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.runs.run import run
+from geometry.arrays import Array
 from sim.recording.recording import Recording
 
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.phantom.kinematics import within_limits
 from models.phantom.parameters import PREMIUM_1_5
 from models.phantom.spec import GIMBAL_JOINTS, MOTOR_JOINTS, phantom_spec

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.runtime import _nrt_python, rtsys
 
-from controllers.state import Array
+from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
 

@@ -109,7 +109,7 @@ print(sum(unit.stats.cache_hits.values()), sum(unit.stats.cache_misses.values())
 @pytest.mark.slow
 def test_next_process_loads_the_unit_also_from_a_copy_of_the_sources(tmp_path):
     here, copy = Path(kernel_units.__file__).parents[2], tmp_path / "copy"
-    for package in ("models", "controllers", "sim"):
+    for package in ("geometry", "models", "controllers", "sim"):
         shutil.copytree(here / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     outputs = [
         subprocess.run(

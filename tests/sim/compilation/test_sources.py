@@ -15,7 +15,7 @@ MODULE = "controllers.haptic_map.cylindrical"
 @pytest.fixture
 def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     root = Path(sources.__file__).parents[2]
-    for package in ("models", "controllers"):
+    for package in ("geometry", "models", "controllers"):
         shutil.copytree(root / package, tmp_path / package, ignore=shutil.ignore_patterns("*.bvh", "__pycache__"))
     monkeypatch.setattr(sources, "_ROOT", tmp_path)
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "cache"))
@@ -38,13 +38,13 @@ def test_change_in_a_direct_or_transitive_import_changes_the_hash(tree: Path) ->
     before = fresh_hash()
     after_own_edit = hash_after_edit(tree, "controllers/haptic_map/cylindrical.py", "\nAGAIN = 1\n")
     assert after_own_edit != before
-    assert hash_after_edit(tree, "controllers/rotations.py", "\nAGAIN = 1\n") != after_own_edit
+    assert hash_after_edit(tree, "geometry/rotations.py", "\nAGAIN = 1\n") != after_own_edit
 
 
 def test_comments_docstrings_and_unrelated_modules_leave_the_hash(tree: Path) -> None:
     before = fresh_hash()
     assert hash_after_edit(tree, "controllers/haptic_map/cylindrical.py", "\n# a comment\n") == before
-    assert hash_after_edit(tree, "controllers/rotations.py", '\n"""Words that stand alone."""\n') == before
+    assert hash_after_edit(tree, "geometry/rotations.py", '\n"""Words that stand alone."""\n') == before
     assert hash_after_edit(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
 
 

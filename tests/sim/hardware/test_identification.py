@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
 from controllers.safety.arming import ARM
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError
 from sim.hardware.gated_servo import Ticker

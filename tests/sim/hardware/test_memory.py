@@ -11,11 +11,11 @@ from numba.core.runtime import _nrt_python, rtsys
 
 from controllers.safety.arming import ARM, NO_REQUEST, State
 from controllers.safety.gate import Gate
-from controllers.state import Array
 from experiments.config import maps, modes
 from experiments.config.run_config import RunConfig
 from experiments.hardware.parts import served, session_of, start_of
 from experiments.setups.parts.defaults import resolved
+from geometry.arrays import Array
 from models.world.scene import SceneConfig
 from sim.hardware.emulated import EmulatedPhantom
 from sim.hardware.gated_servo import GatedServo, Ticker

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.mocap.dynamics.zero_moment_point import nearest_supported
 from tools.clip_authoring.balance import Dynamics
 

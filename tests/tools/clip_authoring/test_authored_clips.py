@@ -3,7 +3,7 @@
 import pytest
 from clip_measures import largest_slide, limb_penetration, limit_excess, measured, residuals
 
-from models.arrays import rms
+from geometry.arrays import rms
 from models.mocap.library import embedded
 
 NAMES = ["walk", "run", "jump", "backflip"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from clip_measures import G, acceleration, measured, tangent_derivative
 
-from models.arrays import rms
+from geometry.arrays import rms
 from models.humanoid.skeleton import BODIES, FOOT_CONTACTS, JOINTS
 from models.mocap.library import embedded
 from tools.clip_authoring import gait

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controllers.certificates.flight.flight_fit import find_flights, fit_flight, fit_free_fall, reachable_rates
-from controllers.gravity import GRAVITY
+from geometry.physics import GRAVITY
 
 FPS = 120.0
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry.quaternions import heading
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
-from models.mocap.motion.quaternions import heading
 
 
 @pytest.fixture(scope="module")

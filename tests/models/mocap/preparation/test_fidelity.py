@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from geometry import quaternions
 from models.humanoid.skeleton import JOINTS
 from models.mocap.library import embedded
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest

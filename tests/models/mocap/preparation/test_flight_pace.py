@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, HAND_CONTACTS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from models.arrays import Array
+from geometry.arrays import Array
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import sole_points

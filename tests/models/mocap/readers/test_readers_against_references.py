@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.mocap.library import read_motion
-from models.mocap.motion import quaternions
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic

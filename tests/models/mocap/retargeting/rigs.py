@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.library import embedded
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations
 from tests.models.mocap.retargeting.rig_families import FAMILIES, NECKS, SPINES

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from geometry import quaternions
 from models.humanoid.skeleton import BODIES, JOINTS, SEGMENTS, joint_range
 from models.mocap.library import embedded, embedded_names, load
-from models.mocap.motion import quaternions
 from models.mocap.motion.kinematics import global_rotations
 from models.mocap.retargeting.arm_twist import with_twist_shared
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.mocap.library import embedded
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations
 from models.mocap.retargeting import footing

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES
 from models.mocap.library import embedded, embedded_names, load, read_motion
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.gravity import GRAVITY
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model, rest_pose
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.library import load, read_motion
-from models.mocap.motion import quaternions
 from models.mocap.motion.clip import pose_difference
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import retarget

@@ -1,4 +1,4 @@
-"""Type aliases of arrays (`controllers.state` has its own: neither package imports the other); root mean square."""
+"""Type aliases of arrays, and their root mean square."""
 
 from typing import TypeAlias
 

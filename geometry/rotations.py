@@ -1,4 +1,4 @@
-"""Unit quaternions (wxyz) as scalars: products, exponential and logarithm, for kernels and, by ``.py_func``, CasADi.
+"""Unit quaternions (wxyz) as numbers: products, exponential and logarithm, for kernels and, by ``.py_func``, CasADi.
 
 A rotation is given by four numbers, never by an array, so that compiled code keeps it in registers. Angular velocity
 is *local* (in the rotated frame): q̇ = ½ q ⊗ ω.

@@ -6,7 +6,7 @@ least 15 times as long for ten thousand.
 
 import numpy as np
 
-from models.arrays import Array
+from geometry.arrays import Array
 
 
 def product(q: Array, r: Array) -> Array:
@@ -39,6 +39,12 @@ def about_axis(axis: int, angle: Array) -> Array:
     q[..., 0] = np.cos(angle / 2)
     q[..., 1 + axis] = np.sin(angle / 2)
     return q
+
+
+def unit(vectors: Array) -> Array:
+    """Unit vectors along vectors of shape (..., 3); NaN where the length is 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(length > 0.0, length, np.nan)
 
 
 def heading(q: Array) -> Array:
@@ -116,12 +122,21 @@ def velocities(q: Array, fps: float) -> Array:
     return (np.vstack((steps[:1], steps)) + np.vstack((steps, steps[-1:]))) / 2.0
 
 
+def angular_velocities(q: Array, rate: Array) -> Array:
+    """Angular velocities 2 Im(q* q̇) in the rotated frame, shape (..., 3), from q̇; if |q| is not 1, they are |q|² ω."""
+    u, du = q[..., 1:], rate[..., 1:]
+    return 2.0 * (q[..., :1] * du - rate[..., :1] * u - _cross(u, du))
+
+
+def with_continuous_signs(q: Array) -> Array:
+    """The same rotations, each quaternion in the hemisphere of the one before (axis 0 is time); the first is kept."""
+    signs = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=-1) < 0.0, -1.0, 1.0), axis=0)[..., None]
+    return np.concatenate([q[:1], q[1:] * signs])
+
+
 def sign_continuous(q: Array) -> Array:
-    """The same rotations, each quaternion in the hemisphere of the one before (axis 0 is time; the first has w ≥ 0)."""
-    signs = np.ones(q.shape[:-1])
-    signs[1:] = np.where(np.sum(q[1:] * q[:-1], axis=-1) < 0.0, -1.0, 1.0)
-    signs[0] = np.where(q[0, ..., 0] < 0.0, -1.0, 1.0)
-    return q * np.cumprod(signs, axis=0)[..., None]
+    """As `with_continuous_signs`, with w ≥ 0 in the first quaternion."""
+    return with_continuous_signs(np.where(q[0, ..., :1] < 0.0, -q, q))
 
 
 def slerped(q: Array, r: Array, share: float | Array) -> Array:

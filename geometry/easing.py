@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from controllers.state import Array
+from geometry.arrays import Array
 
 
 @njit

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.mocap.motion import quaternions
+from geometry import quaternions
 
 
 @pytest.mark.parametrize("angle", [1e-5, 1e-2, 1.0, 2.8, 3.5, 5.0])

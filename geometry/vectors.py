@@ -1,9 +1,10 @@
 """Vectors and unit quaternions (wxyz) as tuples, for kernels that would otherwise spell them out number by number."""
 
+import numpy as np
 from numba import njit
 
-from controllers.rotations import multiply, rotate
-from controllers.state import Array
+from geometry.arrays import Array
+from geometry.rotations import multiply, relative, rotate
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -55,6 +56,16 @@ def product(a: Quaternion, b: Quaternion) -> Quaternion:
 def scaled(k: float, v: Vector) -> Vector:
     """Multiple k v."""
     return k * v[0], k * v[1], k * v[2]
+
+
+@njit(forceinline=True)
+def unit_rotation(s: Array, slope: Array, rate: float, q: Array) -> Vector:
+    """Write q = s/|s| (4,); returns its local angular velocity 2 Im(q⁻¹ ⊗ ṡ)/|s|, ṡ the slope (4,), times a rate."""
+    scale = 1.0 / np.sqrt(max(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3], 1e-12))
+    for j in range(4):
+        q[j] = scale * s[j]
+    _, x, y, z = relative(q[0], q[1], q[2], q[3], slope[0], slope[1], slope[2], slope[3])
+    return scaled(2.0 * rate * scale, (x, y, z))
 
 
 @njit

@@ -1,0 +1,1 @@
+"""Rotations, smooth steps, array types and physical constants, for models and controllers alike; imports neither."""
