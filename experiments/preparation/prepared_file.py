@@ -18,6 +18,7 @@ from models.mocap.retargeting.retarget_report import two_digits
 _ADDED_MOTION = {"way back": "the way back", "open": "coming to rest at both ends"}
 _MAX_NAMED = 3  # largest number of flights whose reasons are in the line for the terminal
 _MIN_OWN_FRACTION = 0.5  # fraction of the file's own motion in the clip below which it is reported
+_MIN_LEFT_OUT = 0.5  # time of the capture that its cycle lacks, from which it is reported [s]
 _MAX_LOST_TURN = 30.0  # change of heading without which a cycle is not called the same motion [°]
 # Acceleration in flights below which a wrong frame rate is more likely than dancers' hovering feet [m/s²]: jumps have 8
 # to 12, dancers' steps 4 to 7.
@@ -120,6 +121,11 @@ def changes(made: Prepared) -> tuple[str, ...]:
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
+    if part.left_out[0] > _MIN_LEFT_OUT:
+        lines.append(
+            f"{part.left_out[0]:.1f} s of the capture, the first at {part.left_out[1]:.2f} s, are unlike the cycle: "
+            "--loop open keeps them"
+        )
     turn, turn_at_rate = np.rad2deg(part.turns)
     if abs(turn - turn_at_rate) > _MAX_LOST_TURN:
         lines.append(

@@ -77,7 +77,7 @@ def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
 
 
 @pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
-def test_flights_that_fall_slowly_and_lost_turns_are_reported(falls, named):
+def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
     clip = embedded("walk")
     looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, (np.pi / 2.0, 0.1))
     change = Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -85,6 +85,8 @@ def test_flights_that_fall_slowly_and_lost_turns_are_reported(falls, named):
         clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0), change,
         fidelity(clip, clip, looped, 1.0), 0.0, near=False,
     )  # fmt: skip
+    eventful = changes(made._replace(looped=looped._replace(left_out=(1.2, 4.5))))
+    assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful
     lines = changes(made)
     assert any("fall at 0.5 m/s², and would fall freely at" in line for line in lines) == named
     assert "the capture turns by 90°, at the cycle's rate by 6°: --loop open keeps its turns" in lines

@@ -92,6 +92,21 @@ def test_turn_that_a_cycle_lacks_is_measured(turning):
     assert found.turns[0] > np.deg2rad(40.0) > np.deg2rad(15.0) > found.turns[1]
 
 
+@pytest.mark.parametrize(("seconds", "kept"), [(0.2, False), (1.2, True)])
+def test_cycle_lacks_a_short_event_at_most_and_measures_it(turning, seconds, kept):
+    """Both arms are raised once in a walk of twelve seconds."""
+    walk = turning[0](lambda x: 0.0)
+    raised, elbow = np.zeros((walk.n_frames, 57)), 6 + 3 * JOINTS.index("left_elbow") + 1
+    envelope = np.clip((seconds / 2.0 + 0.1 - np.abs(np.arange(walk.n_frames) / walk.fps - 5.0)) / 0.1, 0.0, 1.0)
+    for joint in ("left_shoulder", "right_shoulder", "left_elbow", "right_elbow"):
+        raised[:, 6 + 3 * JOINTS.index(joint) + 1] = -2.0 * envelope
+    found = close_or_rest(Clip(add_tangents(walk.poses, raised), walk.fps, "event"))
+    turned = pose_difference(np.repeat(walk.poses[:1], found.clip.n_frames, axis=0), found.clip.poses)[:, elbow]
+    assert (np.ptp(turned) > 1.5) == kept
+    left_out = (0.0, 0.0) if kept else (seconds + 0.2, 5.0 - seconds / 2.0 - 0.1)
+    assert found.left_out == pytest.approx(left_out, abs=0.15)
+
+
 def test_looped_returns_a_closed_clip_unchanged(walks):
     assert close_or_rest(walks[0]).clip is walks[0]
 
