@@ -35,7 +35,7 @@ _MAX_DECLARED_GAP = 0.45
 # 19 captures the same way, 0.9 one differently; half of d leaves CMU 01_01 open, twice takes a dance for a cycle.
 _MIN_COVERED_FRACTION, _MAX_COVERED_DISTANCE = 0.7, 0.35
 # A frame further than this d from all of the cycle is another motion [rad], such as a jump in a walk, of which a cycle
-# may leave out this fraction of the clip. Of 77 cycles 8 had left out such frames, 3 of them more: smash, punch, tennis.
+# may leave out this fraction of the clip. Of 77 cycles 8 left out such frames, 3 of them more (smash, punch, tennis).
 _MAX_UNLIKE_DISTANCE, _MAX_UNLIKE_FRACTION = 0.6, 0.05
 # Largest difference of a frame's yaw rate, its mean over the cycle's duration, from the cycle's [rad/s]: a walk along a
 # curve is a cycle, a turn in a straight walk is not. Half leaves 11 of 156 captures open, among them runs; with twice
