@@ -52,21 +52,17 @@ def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
 
 @pytest.mark.usefixtures("without_page")
 def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: Path) -> None:
-    residuals, furthest = [], []
-    for seed in (1, 2, 3):
-        config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
-        summary = run(config, tmp_path / "bent", True, 0.0)
-        assert summary.stretch is not None
-        assert summary.stretch.edits == 3
-        # The performance begins at full speed in the middle of a step.
-        assert summary.figure.fell_at is None
-        assert summary.performance is not None
-        furthest.append(summary.performance.figure.root_error_max_cm)
-        residuals.append(summary.performance.figure.residual_force_rms)
+    config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0)
+    summary = run(config, tmp_path / "bent", True, 0.0)
+    assert summary.stretch is not None
+    assert summary.stretch.edits == 3
+    # The performance begins at full speed in the middle of a step.
+    assert summary.figure.fell_at is None
+    assert summary.performance is not None
     # 0.10 to 0.15 over three kernels and nine seeds; a figure carried by the residual has 1.
-    assert np.median(residuals) < 0.4
+    assert summary.performance.figure.residual_force_rms < 0.4
     # 1.0 to 1.6 cm, or 3.3 if lifting ends in another optimum, depending on the kernels of OpenBLAS.
-    assert np.median(furthest) < 5.0
+    assert summary.performance.figure.root_error_max_cm < 5.0
 
 
 def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
