@@ -14,18 +14,7 @@ import hvf
 from experiments.cli import main
 from experiments.files.device_files import save_device
 from experiments.results.folder import locked_folder
-
-CURVE = hvf.circle(lap=2.0)
-
-
-@hvf.law
-def level(hand, k=50.0):
-    return (0.0, 0.0, -k * hand.p[2])
-
-
-def simulation(field: hvf.Law, **parts: object) -> hvf.Simulation:
-    around = hvf.Cylindrical(hvf.clips("cheer"), around=CURVE)
-    return hvf.Simulation(field=field, haptic_map=around, **parts)  # pyright: ignore[reportArgumentType]
+from tests.experiments.runs.simulations import CURVE, level, simulation
 
 
 def test_every_name_in_all_exists() -> None:

@@ -1,4 +1,4 @@
-"""Simulations from Python: runs in memory and their results, sweeps, ticks, own maps that fail, replay in a notebook."""
+"""Simulations from Python: runs in memory, their results, sweeps, ticks, own maps that fail, replay in a notebook."""
 
 from pathlib import Path
 
@@ -9,36 +9,27 @@ import hvf
 
 
 @pytest.fixture(scope="module")
-def sim() -> hvf.Simulation:
-    curve = hvf.circle(lap=2.0)
-    return hvf.Simulation(
-        field=hvf.Follow(curve, k_r=300, b_d=8), haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=curve),
-        figure=hvf.Figure(kind="none"),
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
 def run(sim: hvf.Simulation) -> hvf.Run:
     return sim.run(0.5)
 
 
-@pytest.mark.slow
-def test_run_and_sweep_give_measures_channels_animation_page_and_table(tmp_path: Path) -> None:
-    """Of the physical figure, in a composed field, with a push."""
+def test_run_gives_measures_channels_animation_page_and_table(tmp_path: Path) -> None:
     curve = hvf.circle(radius=0.0477, lap=2.0)
-    sim = hvf.Simulation(
+    run = hvf.Simulation(
         device=hvf.Phantom(), field=(hvf.Follow(curve, k_r=300, b_d=8) + hvf.law(lambda hand: (0, 0, 0))).limited(8.0),
-        haptic_map=hvf.Cylindrical(hvf.clips("walk", "jump"), around=curve),
+        haptic_map=hvf.Cylindrical(hvf.clips("walk", "jump"), around=curve), figure=hvf.Figure(kind="kinematic"),
         user=hvf.User(pushes=[hvf.Push(at=2.5, seconds=0.5, force=2.5)]), seed=1,
-    )  # fmt: skip
-    run = sim.run(4.0)
+    ).run(4.0)  # fmt: skip
     assert isinstance(run, hvf.Run)
     assert run.summary.path.deviation_rms < 1e-3
     assert run.ticks["force"].shape == (4000, 3)
     assert hvf.load(run.to_bvh(tmp_path / "edited.bvh")).duration == pytest.approx(4.0, abs=0.1)
     assert run.report().stat().st_size > 1e5
     assert {"force_0", "p_2"} <= set(run.frame().columns)
-    *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.5, threads=2)
+
+
+def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
+    *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.1, threads=2)
     assert isinstance(last, hvf.Swept)
     assert last.values == {"field.k_r": 800}
 
@@ -67,7 +58,7 @@ def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pyt
         field=hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8), haptic_map=Failing(),
         figure=hvf.Figure(kind="kinematic"),
     )  # fmt: skip
-    with pytest.raises(Exception, match="beyond what this map"):
+    with pytest.raises(ValueError, match="beyond what this map"):
         moves.run(0.5)
     assert not list(tmp_path.iterdir())
 

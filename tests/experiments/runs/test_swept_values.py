@@ -7,18 +7,7 @@ import pytest
 
 import hvf
 from experiments.runs.sweep import with_values
-
-CURVE = hvf.circle(lap=2.0)
-
-
-@hvf.law
-def level(hand, k=50.0):
-    return (0.0, 0.0, -k * hand.p[2])
-
-
-def simulation(field: hvf.Law, **parts: object) -> hvf.Simulation:
-    around = hvf.Cylindrical(hvf.clips("cheer"), around=CURVE)
-    return hvf.Simulation(field=field, haptic_map=around, **parts)  # pyright: ignore[reportArgumentType]
+from tests.experiments.runs.simulations import CURVE, level, simulation
 
 
 def test_gain_of_one_law_in_a_composed_field_is_set() -> None:
@@ -96,10 +85,9 @@ def test_invalid_sweep_tuning_or_record_arguments_are_refused() -> None:
             hvf.tune(sim, {"field.k_r": bounds}, lambda run: 1.0)  # pyright: ignore[reportArgumentType]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("cost", [float("nan"), None, (1.0, 2.0)])
 def test_non_numeric_cost_ends_the_search(cost: Any) -> None:
-    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
+    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), figure=hvf.Figure(kind="none"))
     with pytest.raises(hvf.ParameterError, match=r"^the cost at {'field\.k_r': .*expected 1 finite"):
         hvf.tune(sim, {"field.k_r": (100.0, 101.0)}, lambda run: cost, seconds=0.1, search=hvf.Search(candidates=1))
 
