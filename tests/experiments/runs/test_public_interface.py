@@ -76,11 +76,11 @@ class Shrinking(hvf.HapticMap):
     """A map whose poses have the wrong size after some calls."""
 
     def __init__(self) -> None:
-        self.asked = 0
+        self.calls = 0
 
     def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
-        self.asked += 1
-        return hvf.rest_pose()[: 75 if self.asked < 30 else 3]
+        self.calls += 1
+        return hvf.rest_pose()[: 75 if self.calls < 30 else 3]
 
 
 def test_failing_own_map_is_reported_and_leaves_no_folder(monkeypatch, tmp_path: Path) -> None:

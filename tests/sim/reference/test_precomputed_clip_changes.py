@@ -25,7 +25,7 @@ from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip, pose_difference
 from sim.recording.recording import Recording
 from sim.reference.reference import make_reference, map_poses, reference_along
-from tests.experiments.own_process import RUNS, TELLS, compiled, process
+from tests.experiments.own_process import COMMAND, LISTENER, compiled_names, run_python
 from tests.sim.gliding_hand import gliding_hand
 
 LAP, PERIOD = 3.4, 2e-3
@@ -178,13 +178,13 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run_with_changes(run_folder: Path) -> CompletedProcess[str]:
     """A pushed hand among the rivers of three clips: a separate process computes the changes and caches them."""
     rivers = ("--mode", "rivers", "--map", "rivers", "--clips", *DISTINCT_CLIPS, "--lap", f"{LAP}")
-    return process(TELLS + RUNS, "run", *rivers, "--user", "push", "--seconds", "6", "--out", str(run_folder))
+    return run_python(LISTENER + COMMAND, "run", *rivers, "--user", "push", "--seconds", "6", "--out", str(run_folder))
 
 
 @pytest.mark.slow
 def test_run_with_changes_compiles_nothing_in_its_own_process(run_with_changes: CompletedProcess[str]) -> None:
     assert "The stylus ran" in run_with_changes.stdout
-    assert compiled(run_with_changes) == []
+    assert compiled_names(run_with_changes) == []
 
 
 @pytest.mark.slow
