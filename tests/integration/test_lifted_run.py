@@ -65,6 +65,7 @@ def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: 
     assert summary.performance.figure.root_error_max_cm < 5.0
 
 
+@pytest.mark.usefixtures("without_page")
 def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
     run(run_config(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:

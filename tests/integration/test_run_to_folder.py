@@ -86,6 +86,7 @@ def test_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: p
     assert "changed: clips;" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize("figure", ["kinematic", "none"])
 def test_run_without_physical_figure_is_reproduced(figure: str, tmp_path: Path) -> None:
     out = str(tmp_path / "run")

@@ -32,6 +32,7 @@ def lifted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.usefixtures("without_page")
 def test_keyword_run_equals_command_line_run(tmp_path: Path) -> None:
     run = hvf.run(**KEYWORDS)
     options = ["--clips", "walk", "run", "--lap", "2", "--figure", "none", "--seconds", "0.3", "--out"]

@@ -21,6 +21,7 @@ def test_recording_of_python_simulation_refers_to_its_script(
     assert stderr.count("\n") == 1
 
 
+@pytest.mark.usefixtures("without_page")
 def test_recording_of_another_version_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import h5py
 
