@@ -58,24 +58,6 @@ def test_run_has_remarks_on_unsuitable_clips() -> None:
     assert str(run).startswith(run.remarks[0])
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ({"mode": "flow"}, "no mode 'flow'"),
-        ({"lapp": 2.0}, "^lapp is not known"),
-        ({"flow": "constant", "mode": "bunny"}, "^flow has no meaning"),
-        ({"clips": [3]}, "clips"),
-        ({"clips": "walk"}, "clips"),
-        ({"config": 3}, "config is 3"),
-        ({"record": 3}, "record is 3"),
-        ({"seconds": -1.0}, "seconds"),
-    ],
-)
-def test_wrong_keyword_is_named(words: dict[str, Any], message: str) -> None:
-    with pytest.raises(hvf.ParameterError, match=message):
-        hvf.run(**words)
-
-
 def test_lifted_curve_plays_its_clip(lifted: Path) -> None:
     lifted_map = hvf.Lifted(lifted, "cheer")
     assert lifted_map.names == ("walk", "cheer")

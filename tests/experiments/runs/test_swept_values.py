@@ -1,7 +1,5 @@
 """Numbers of a simulation that a sweep or a search sets, by their path."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -83,13 +81,6 @@ def test_invalid_sweep_tuning_or_record_arguments_are_refused() -> None:
     for bounds in ((500.0, 50.0), (50.0,), (50.0, float("inf"))):
         with pytest.raises(hvf.ParameterError, match=r"^field\.k_r is .*expected the lowest and the highest value"):
             hvf.tune(sim, {"field.k_r": bounds}, lambda run: 1.0)  # pyright: ignore[reportArgumentType]
-
-
-@pytest.mark.parametrize("cost", [float("nan"), None, (1.0, 2.0)])
-def test_non_numeric_cost_ends_the_search(cost: Any) -> None:
-    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8), figure=hvf.Figure(kind="none"))
-    with pytest.raises(hvf.ParameterError, match=r"^the cost at {'field\.k_r': .*expected 1 finite"):
-        hvf.tune(sim, {"field.k_r": (100.0, 101.0)}, lambda run: cost, seconds=0.1, search=hvf.Search(candidates=1))
 
 
 def test_number_within_a_sequence_is_refused() -> None:
