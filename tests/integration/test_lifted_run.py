@@ -124,30 +124,3 @@ def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pyt
     error = capsys.readouterr().err
     assert "the curve 'walk' has no transition to push over at; there are: none" in error
     assert len(error.strip().splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["lift", "walk", "--out", "map.txt"], "a map is written into a .npz file"),
-        (["lift", "walk", "nobody"], "no embedded clip 'nobody'"),
-        (["lift", "walk", "--cyclic", "run"], "cyclic names run; expected some of the clips"),
-        (["lift", "walk", "--room.r-range", "0.02", "0.3"], "does not reach|beyond the Phantom's stops"),
-        (["lift", "walk", "run", "--room.separation", "0.2"], "2 clips do not fit 200 mm apart"),
-        (["run", "--curve", "walk"], "--curve has no meaning with --mode follow; it belongs to --map FILE.npz"),
-    ],
-)
-def test_invalid_lift_command_is_refused_in_one_line(
-    arguments: list[str],
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    import re
-
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
-    error = capsys.readouterr().err
-    assert re.search(message, error), error
-    assert len(error.strip().splitlines()) == 1

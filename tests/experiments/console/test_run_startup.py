@@ -1,5 +1,6 @@
 """Start of a run: it imports nothing that it does not need, and compiles nothing in its own process."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -72,17 +73,21 @@ def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> No
     assert compiled_names(completed) == []
 
 
+# In a separate process, for the peak memory of a process never decreases.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls")],
     ids=["cylinder", "lifted", "expressive"],
 )
-def test_run_compiles_nothing_in_its_own_process(arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path) -> None:
+def test_run_compiles_nothing_in_its_own_process_and_needs_less_than_1_gb(
+    arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path
+) -> None:
     given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
     completed = run_python(LISTENER + COMMAND, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
     assert "The stylus ran" in completed.stdout
     assert compiled_names(completed) == []
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0
 
 
 @pytest.mark.slow
