@@ -235,7 +235,7 @@ def test_python_search_resumes_only_its_own_candidates(tmp_path: Path) -> None:
 
     def found(damping: float, cost: Callable[[hvf.Run], float]) -> TunedSimulation:
         field = hvf.Follow(curve, k_r=300, b_d=damping).limited(8.0)
-        sim = hvf.Simulation(field=field, haptic_map=walk)
+        sim = hvf.Simulation(field=field, haptic_map=walk, figure=hvf.Figure(kind="none"))
         return hvf.tune(sim, space, cost, seconds=0.2, search=search)
 
     first = found(8.0, lambda run: 1.0)
