@@ -210,7 +210,8 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     assert "changed: clip;" in capsys.readouterr().err
     other = [*clip, "--tolerance.gravity", "9.0", "9.81001"]
     assert main(other) == 2
-    assert "holds a certificate of something else" in capsys.readouterr().err
+    message = f"hvf: {out}: holds a certificate of something else; choose another --out, or --overwrite it\n"
+    assert capsys.readouterr().err == message
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
     assert main([*other, "--overwrite"]) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns != written
@@ -220,6 +221,24 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err
     assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
     assert "expected a certificate.json" in capsys.readouterr().err
+
+
+def test_clip_certificate_is_verified_with_its_stored_options(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["certify", "--clip", "walk", "--friction", "0.5", "--out", "here"]) == 0
+    assert main(["certify", "--verify", "here/certificate.json"]) == 0
+    assert "all that it is of is as it was" in capsys.readouterr().out
+    assert main(["certify", "--clip", "walk", "--verify", "here/certificate.json"]) == 1
+    assert "changed: judging" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_field_certificate_is_verified_with_its_stored_gains(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["certify", "--stiffness", "500", "--no-hand", "--out", "field"]) == 0
+    assert main(["certify", "--verify", "field/certificate.json"]) == 0
+    assert main(["certify", "--stiffness", "400", "--no-hand", "--verify", "field/certificate.json"]) == 1
+    assert "changed: gains" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("rig", [Rig(), Rig(leading=1), Rig(without=("head", "neck"), leading=1)])
