@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
+from experiments.preparation.tracking_trial import followed
 
 ROOT = Path(__file__).resolve().parents[2]
 WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
@@ -29,7 +30,10 @@ def test_results_are_printed_as_json(run_folder: Path, tmp_path: Path, capsys: p
 
 
 @pytest.mark.slow
-def test_results_of_slow_commands_are_printed_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_of_slow_commands_are_printed_as_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
     capsys.readouterr()
     assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["root_error"] < 0.1
     assert _json(["arm", "--seconds", "1.5", "--user", "relaxed", "--out", str(tmp_path / "arm")], capsys)["lines"]

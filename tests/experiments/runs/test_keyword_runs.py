@@ -9,6 +9,7 @@ import pytest
 import hvf
 from experiments.cli import main
 from experiments.preparation import prepared_clip
+from experiments.preparation.tracking_trial import followed
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
@@ -99,7 +100,8 @@ def test_loaded_capture_is_prepared_as_in_a_run(
 
 
 @pytest.mark.slow
-def test_prepare_returns_clip_and_measures(capture: Path, tmp_path: Path) -> None:
+def test_prepare_returns_clip_and_measures(capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
     prepared = hvf.prepare(capture, tmp_path / "ready.bvh")
     assert "well-formed" in str(prepared)
     many = prepared._replace(flights=tuple(f"flight {k}" for k in range(7)))
