@@ -27,13 +27,10 @@ def run_with_umockdev(*arguments: str, seconds: float = 240.0) -> str:
 
 
 @pytest.mark.slow
-def test_device_contract_holds_for_hid_and_spacemouse_through_nodes() -> None:
-    assert "18 passed" in run_with_umockdev("tests/contract/test_device_contract.py", "-k", "node")
-
-
-@pytest.mark.slow
-def test_driver_device_list_and_doctor_work_on_a_node() -> None:
-    assert "15 passed" in run_with_umockdev("tests/devices/inside_umockdev.py", "-k", "not command_line")
+def test_contract_driver_device_list_and_doctor_hold_for_hid_and_spacemouse_through_nodes() -> None:
+    files = ("tests/contract/test_device_contract.py", "tests/devices/inside_umockdev.py")
+    chosen = "(test_device_contract and node) or (inside_umockdev and not command_line)"
+    assert "33 passed" in run_with_umockdev(*files, "-k", chosen)
 
 
 @pytest.mark.processes

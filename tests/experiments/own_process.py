@@ -1,9 +1,9 @@
-"""A command in a process of its own, and what that process compiles."""
+"""Python code and commands in a separate process, and the names of what that process compiles."""
 
 import subprocess
 import sys
 
-TELLS = """
+LISTENER = """
 import sys
 from numba.core import event
 
@@ -16,14 +16,14 @@ class Compilations(event.Listener):
 
 event.register("numba:compile", Compilations())
 """
-RUNS = "from experiments.cli import main; sys.exit(main(sys.argv[1:]))"
+COMMAND = "from experiments.cli import main; sys.exit(main(sys.argv[1:]))"
 
 
-def process(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """What Python says to code of this module or one's own."""
+def run_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """The completed process of Python code with command-line arguments."""
     return subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, text=True)
 
 
-def compiled(ran: subprocess.CompletedProcess[str]) -> list[str]:
-    """Names of what it compiled, if `TELLS` came first."""
-    return [line for line in ran.stderr.splitlines() if line.startswith("compiles")]
+def compiled_names(completed: subprocess.CompletedProcess[str]) -> list[str]:
+    """Lines that name the functions compiled by a process whose code begins with `LISTENER`."""
+    return [line for line in completed.stderr.splitlines() if line.startswith("compiles")]

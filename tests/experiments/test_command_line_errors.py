@@ -16,6 +16,11 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
     [
         (["run", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than 9223372036854775808"),
         (["lift", "walk", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than"),
+        (["lift", "walk", "--out", "map.txt"], "a map is written into a .npz file"),
+        (["lift", "walk", "nobody"], "no embedded clip 'nobody'"),
+        (["lift", "walk", "--cyclic", "run"], "cyclic names run; expected some of the clips"),
+        (["lift", "walk", "--room.r-range", "0.02", "0.3"], "the Phantom"),
+        (["lift", "walk", "run", "--room.separation", "0.2"], "2 clips do not fit 200 mm apart"),
         (["arm", "--seed", "9" * 23], "--seed is 99999999999999999999999; expected less than"),
         (["run", "--out", ""], "nothing is given after --out; expected a value"),
         (["run", "--out="], "nothing is given after --out; expected a value"),

@@ -7,16 +7,10 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
+from experiments.preparation.tracking_trial import followed
 
 ROOT = Path(__file__).resolve().parents[2]
 WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(out)]) == 0
-    return out
 
 
 def _json(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> Any:
@@ -24,19 +18,22 @@ def _json(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
-def test_results_are_printed_as_json(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_are_printed_as_json(run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     capsys.readouterr()
     out = str(tmp_path / "run")
     result = _json(["run", "--figure", "none", "--seconds", "0.5", "--out", out], capsys)
     assert result["path"]["laps"] > 0.1
     assert result == json.loads(Path(out, "summary.json").read_text())
-    assert _json(["reproduce", str(run)], capsys)["same"] is True
+    assert _json(["reproduce", str(run_folder)], capsys)["same"] is True
     assert _json(["convert", str(WALK), str(tmp_path / "walk.bvh")], capsys)["lines"]
     assert {clip["name"] for clip in _json(["clips"], capsys)} >= {"walk", "run"}
 
 
 @pytest.mark.slow
-def test_results_of_slow_commands_are_printed_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_of_slow_commands_are_printed_as_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
     capsys.readouterr()
     assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["root_error"] < 0.1
     assert _json(["arm", "--seconds", "1.5", "--user", "relaxed", "--out", str(tmp_path / "arm")], capsys)["lines"]

@@ -1,6 +1,7 @@
 """Every example script runs unchanged and prints its expected result."""
 
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -30,11 +31,13 @@ def test_every_example_has_an_expected_output() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_example_runs_and_prints_its_result(path: Path, tmp_path: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    completed = subprocess.run(
-        [sys.executable, str(path)], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert completed.returncode == 0, completed.stderr
-    assert PRINTS[path.stem] in completed.stdout
+def test_example_runs_and_prints_its_result(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    if path.stem == "own_law":  # compiles a law of `__main__`, which another process has to find
+        subprocess.run([sys.executable, path], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, check=True)
+    else:
+        monkeypatch.chdir(tmp_path)
+        runpy.run_path(str(path), run_name="__main__")
+    assert PRINTS[path.stem] in capfd.readouterr().out
     assert not list(tmp_path.iterdir())

@@ -112,6 +112,7 @@ def test_stepping_run_returns_along_a_wider_s_curve(tmp_path: Path, monkeypatch:
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))
 
 
+@pytest.mark.usefixtures("without_page")
 def test_led_run_flies_along_the_s_curve_and_returns(tmp_path: Path) -> None:
     run(run_config(mode="lead", clips=("run",), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())

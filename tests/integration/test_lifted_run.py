@@ -52,23 +52,20 @@ def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
 
 @pytest.mark.usefixtures("without_page")
 def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: Path) -> None:
-    residuals, furthest = [], []
-    for seed in (1, 2, 3):
-        config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0, seed=seed)
-        summary = run(config, tmp_path / "bent", True, 0.0)
-        assert summary.stretch is not None
-        assert summary.stretch.edits == 3
-        # The performance begins at full speed in the middle of a step.
-        assert summary.figure.fell_at is None
-        assert summary.performance is not None
-        furthest.append(summary.performance.figure.root_error_max_cm)
-        residuals.append(summary.performance.figure.residual_force_rms)
+    config = run_config(map=str(map_file), mode="stretch-then-follow", curve="walk", seconds=20.0)
+    summary = run(config, tmp_path / "bent", True, 0.0)
+    assert summary.stretch is not None
+    assert summary.stretch.edits == 3
+    # The performance begins at full speed in the middle of a step.
+    assert summary.figure.fell_at is None
+    assert summary.performance is not None
     # 0.10 to 0.15 over three kernels and nine seeds; a figure carried by the residual has 1.
-    assert np.median(residuals) < 0.4
+    assert summary.performance.figure.residual_force_rms < 0.4
     # 1.0 to 1.6 cm, or 3.3 if lifting ends in another optimum, depending on the kernels of OpenBLAS.
-    assert np.median(furthest) < 5.0
+    assert summary.performance.figure.root_error_max_cm < 5.0
 
 
+@pytest.mark.usefixtures("without_page")
 def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path, tmp_path: Path) -> None:
     run(run_config(map=str(map_file), mode="rivers", curve="walk", seconds=5.0), tmp_path / "alone", True, 0.0)
     with Recording(tmp_path / "alone" / "run.h5") as recording:
@@ -126,31 +123,4 @@ def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pyt
     assert main(["run", "--map", out, "--mode", "rivers", "--user", "push", "--out", str(tmp_path / "run")]) == 2
     error = capsys.readouterr().err
     assert "the curve 'walk' has no transition to push over at; there are: none" in error
-    assert len(error.strip().splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["lift", "walk", "--out", "map.txt"], "a map is written into a .npz file"),
-        (["lift", "walk", "nobody"], "no embedded clip 'nobody'"),
-        (["lift", "walk", "--cyclic", "run"], "cyclic names run; expected some of the clips"),
-        (["lift", "walk", "--room.r-range", "0.02", "0.3"], "does not reach|beyond the Phantom's stops"),
-        (["lift", "walk", "run", "--room.separation", "0.2"], "2 clips do not fit 200 mm apart"),
-        (["run", "--curve", "walk"], "--curve has no meaning with --mode follow; it belongs to --map FILE.npz"),
-    ],
-)
-def test_invalid_lift_command_is_refused_in_one_line(
-    arguments: list[str],
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    import re
-
-    monkeypatch.chdir(tmp_path)
-    assert main(arguments) == 2
-    error = capsys.readouterr().err
-    assert re.search(message, error), error
     assert len(error.strip().splitlines()) == 1

@@ -263,11 +263,11 @@ def test_curves_are_plotted_live(tab: Any, served: ServedPage) -> None:
 def test_second_browser_watches_and_takes_over_an_idle_driver(
     chromium: Any, tab: Any, served: ServedPage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    desk, who = served.desk, served.page.driver
+    desk, arbiter = served.desk, served.page.driver
     tab.get_by_role("tab", name="Play").click()
     button(tab, "Reset").click()
-    served.assert_until(lambda: who.client is not None, "somebody drives")
-    first = who.client
+    served.assert_until(lambda: arbiter.client is not None, "somebody drives")
+    first = arbiter.client
     other = new_tab(chromium, served.address)
     try:
         other.get_by_text(f"browser {first} drives").wait_for()  # it watches
@@ -278,12 +278,12 @@ def test_second_browser_watches_and_takes_over_an_idle_driver(
         button(tab, "Step").click()
         button(other, "Drive").click()
         other.get_by_text("Somebody drives.").last.wait_for()
-        assert who.client == first
+        assert arbiter.client == first
         monkeypatch.setattr(driver, "IDLE", 0.0)
         button(other, "Drive").click()
-        served.assert_until(lambda: who.client not in (None, first), "the other one drives")
+        served.assert_until(lambda: arbiter.client not in (None, first), "the other one drives")
         button(other, "Reset").click()
         served.assert_until(lambda: float(desk.now["t"][0]) < before, "and what it does counts")
     finally:
         other.close()
-    served.assert_until(lambda: who.client is None, "nobody drives")
+    served.assert_until(lambda: arbiter.client is None, "nobody drives")

@@ -22,13 +22,13 @@ class LoggingDesk(Desk):
     """A desk that stores its messages."""
 
     def __init__(self, folder: Path):
-        self.said: list[str] = []
-        super().__init__(folder, self.said.append)
+        self.messages: list[str] = []
+        super().__init__(folder, self.messages.append)
 
-    def until(self, condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+    def until(self, condition: Callable[[], bool], state: str, patience: float = PATIENCE) -> None:
         end = time.monotonic() + patience
         while not condition():
-            assert time.monotonic() < end, f"not so after {patience:g} s: {what}; said: {self.said}"
+            assert time.monotonic() < end, f"not so after {patience:g} s: {state}; messages: {self.messages}"
             self.poll()
             time.sleep(0.01)
 
@@ -130,9 +130,9 @@ def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path
     with pytest.raises(SimError, match="one file at a time"):
         desk.upload("second.bvh", b"")
     desk.until(lambda: desk.preparing is None, "the broken one is answered")
-    assert desk.said[-1].startswith("broken.bvh")
-    assert "\n" not in desk.said[-1]
-    assert str(desk.folder) not in desk.said[-1]
+    assert desk.messages[-1].startswith("broken.bvh")
+    assert "\n" not in desk.messages[-1]
+    assert str(desk.folder) not in desk.messages[-1]
     write_bvh(embedded("cheer"), tmp_path / "own.bvh")
     desk.upload("own.bvh", (tmp_path / "own.bvh").read_bytes())
     desk.until(lambda: "own" in desk.clips, "one's own is taken")
@@ -146,7 +146,7 @@ def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path
 def test_failed_build_is_reported_and_the_run_continues(desk: LoggingDesk) -> None:
     builds = desk.builds
     desk.build(run_config(map="cylindrical", clips=("nobody.bvh",), figure="kinematic"))
-    desk.until(lambda: "nobody.bvh" in desk.said[-1], "it is said")
+    desk.until(lambda: "nobody.bvh" in desk.messages[-1], "it is reported")
     assert desk.builds == builds
     before = time_of(desk)
     desk.until(lambda: time_of(desk) > before, "time goes on")
@@ -160,7 +160,7 @@ def test_asf_and_amc_upload_is_prepared_and_driven(desk: LoggingDesk) -> None:
     for name in ("02.asf", "02_03.amc"):
         desk.upload(name, (CAPTURES / name).read_bytes())
     desk.until(lambda: desk.preparing is None, "it is prepared", patience=4.0 * PATIENCE)
-    assert "02_03" in desk.clips, desk.said[-1]
+    assert "02_03" in desk.clips, desk.messages[-1]
     builds = desk.builds
     desk.build(run_config(map="cylindrical", clips=(str(desk.clips["02_03"]),), figure="kinematic", seconds=3600.0))
     desk.until(lambda: desk.builds > builds, "it is driven")

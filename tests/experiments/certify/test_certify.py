@@ -12,6 +12,7 @@ from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import CertificateError
 from experiments.certify import certified_field
+from experiments.certify.certificate_page import certificate_page
 from experiments.certify.certified_field import certificate_inputs
 from experiments.certify.certify import (
     CERTIFICATE,
@@ -34,14 +35,21 @@ HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder_and_certificate(tmp_path_factory):
+    """Of the demo's river, written over files that are no certificate."""
     out = tmp_path_factory.mktemp("certificate")
-    certify_into(run_config(), out, hands=HANDS)
-    return out
+    (out / CERTIFICATE).write_text("not json")
+    (out / PAGE).write_text("")
+    return out, certify_into(run_config(), out, hands=HANDS)
+
+
+@pytest.fixture(scope="module")
+def folder(folder_and_certificate):
+    return folder_and_certificate[0]
 
 
 @pytest.mark.slow
-def test_demo_river_is_certified_and_reported(folder):
+def test_demo_river_is_certified_and_reported_in_place_of_an_invalid_certificate(folder):
     certificate = json.loads((folder / CERTIFICATE).read_text())
     assert certificate["stability"]["verdict"] == "certified"
     assert certificate["energy"]["verdict"] == "certified"
@@ -50,6 +58,16 @@ def test_demo_river_is_certified_and_reported(folder):
     assert "stability: " in page
     assert "<script" not in page
     assert (folder / PLOT).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_page_has_words_and_units_and_no_arrays(folder_and_certificate):
+    folder, certificate = folder_and_certificate
+    page = (folder / PAGE).read_text()
+    assert "array(" not in page
+    assert "critical damping b_d, no hand</td><td>" in page
+    assert "N s/m" in page
+    assert "HandImpedance(" not in certificate_page(certificate, {}).split("Counterexample")[1]
 
 
 @pytest.mark.slow
@@ -174,13 +192,6 @@ def test_invalid_certificate_files_are_refused(tmp_path, text):
             read_certificate(tmp_path / CERTIFICATE)
 
 
-@pytest.mark.slow
-def test_existing_invalid_certificate_file_is_replaced(folder, tmp_path):
-    (tmp_path / CERTIFICATE).write_text("not json")
-    (tmp_path / PAGE).write_text("")
-    assert certify_into(run_config(), tmp_path, hands=HANDS).verdicts["stability"].verdict == "certified"
-
-
 def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp_path, capsys):
     out = tmp_path / "jump"
     clip = ["certify", "--clip", "jump", "--out", str(out)]
@@ -199,7 +210,8 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     assert "changed: clip;" in capsys.readouterr().err
     other = [*clip, "--tolerance.gravity", "9.0", "9.81001"]
     assert main(other) == 2
-    assert "holds a certificate of something else" in capsys.readouterr().err
+    message = f"hvf: {out}: holds a certificate of something else; choose another --out, or --overwrite it\n"
+    assert capsys.readouterr().err == message
     assert (out / CERTIFICATE).stat().st_mtime_ns == written
     assert main([*other, "--overwrite"]) == 0
     assert (out / CERTIFICATE).stat().st_mtime_ns != written
@@ -209,6 +221,24 @@ def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp
     assert "--friction is 0; expected more than 0" in capsys.readouterr().err
     assert main(["certify", "--verify", str(tmp_path / "none.json")]) == 2
     assert "expected a certificate.json" in capsys.readouterr().err
+
+
+def test_clip_certificate_is_verified_with_its_stored_options(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["certify", "--clip", "walk", "--friction", "0.5", "--out", "here"]) == 0
+    assert main(["certify", "--verify", "here/certificate.json"]) == 0
+    assert "valid, nothing that it covers has changed" in capsys.readouterr().out
+    assert main(["certify", "--clip", "walk", "--verify", "here/certificate.json"]) == 1
+    assert "changed: judging" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_field_certificate_is_verified_with_its_stored_gains(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["certify", "--stiffness", "500", "--no-hand", "--out", "field"]) == 0
+    assert main(["certify", "--verify", "field/certificate.json"]) == 0
+    assert main(["certify", "--stiffness", "400", "--no-hand", "--verify", "field/certificate.json"]) == 1
+    assert "changed: gains" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("rig", [Rig(), Rig(leading=1), Rig(without=("head", "neck"), leading=1)])

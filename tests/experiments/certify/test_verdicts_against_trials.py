@@ -44,6 +44,7 @@ def simulation(field):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_page")
 def test_command_refutes_a_run_that_oscillates(tmp_path):
     field = ["--clips", "backflip", "--governor", "--governor-drag", "200"]
     assert main(["certify", *field, "--no-hand", "--json", "--out", str(tmp_path / "governed")]) == 0

@@ -1,5 +1,6 @@
 """Messages from Python name keyword arguments where those of the command line name options."""
 
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -112,6 +113,9 @@ def person_session(**does: Any) -> Any:
         (lambda: hvf.run(orientation=True), "orientation is not known; there are "),
         (lambda: hvf.run(user="cut"), 'add a person, such as person="median"'),
         (lambda: hvf.run(clips="walk"), "clips is 'walk'; expected a list"),
+        (lambda: hvf.run(clips=[3]), "clips"),  # pyright: ignore
+        (lambda: hvf.run(config=3), "config is 3"),  # pyright: ignore
+        (lambda: hvf.run(record=3), "record is 3"),  # pyright: ignore
         (lambda: hvf.run(seed=1.5), "seed is 1.5; expected a whole number"),
         (lambda: hvf.run(out="x"), "out is an option of the command line; expected record, a folder to write into"),
         (lambda: hvf.run(overwrite="no"), "overwrite is 'no'; expected True or False"),
@@ -142,10 +146,10 @@ def test_messages_of_public_interface_name_keywords(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("wrong", ["x", True, None])
+@pytest.mark.parametrize("wrong", ["x", True, None, NAN, (1.0, 2.0)])
 def test_non_numeric_cost_is_refused_with_its_values(wrong: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("experiments.tuning.tune.certify", lambda sim: SimpleNamespace(stability=CERTIFIED))
-    message = rf"^the cost at \{{'field\.k_r': \d.*\}} is {wrong!r}; expected 1 finite number"
+    message = rf"^the cost at \{{'field\.k_r': \d.*\}} is {re.escape(repr(wrong))}; expected 1 finite number"
     with pytest.raises(hvf.ParameterError, match=message):
         hvf.tune(SIM, SPACE, lambda run: wrong, seconds=0.1, search=hvf.Search(candidates=1))
 

@@ -42,7 +42,7 @@ def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: flo
 def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Path) -> None:
     out = tmp_path / "run"
     words = ["run", "--figure", "none", "--seconds", "2000", "--out", str(out)]
-    stderr = stderr_of_interrupted(words, (out / "run.h5").exists, wait=1.5)
+    stderr = stderr_of_interrupted(words, (out / "run.h5").exists, wait=0.5)
     assert f"hvf report {out}" in stderr.replace("\n", " ")
     with Recording(out / "run.h5") as recording:
         assert not recording.complete
@@ -54,7 +54,7 @@ def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Pa
 
 STUDY = """name = "Stopped"
 seconds = 2.0
-repetitions = 12
+repetitions = 6
 [run]
 figure = "none"
 [users]
@@ -83,6 +83,6 @@ def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> N
     assert "the same command resumes" in stderr
     assert str(tmp_path / "study") in stderr
     before = stored_trials()
-    assert 0 < before < 96
+    assert 0 < before < 48
     assert main(words) == 0
-    assert stored_trials() == 96
+    assert stored_trials() == 48

@@ -1,5 +1,6 @@
 """Start of a run: it imports nothing that it does not need, and compiles nothing in its own process."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +13,7 @@ from experiments.files.map_files import save_map
 from experiments.fitting.figure_legs import figure_legs
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
-from tests.experiments.own_process import RUNS, TELLS, compiled, process
+from tests.experiments.own_process import COMMAND, LISTENER, compiled_names, run_python
 
 HEAVY = ("matplotlib", "casadi", "viser", "trimesh", "scipy.stats", "scipy.signal", "scipy.integrate")
 
@@ -34,24 +35,24 @@ _COMPILES = "from geometry.easing import smooth_step; smooth_step(0.5)"
 
 @pytest.mark.slow
 def test_run_imports_no_heavy_module_early() -> None:
-    assert not process(_IMPORTS).stdout.split()
+    assert not run_python(_IMPORTS).stdout.split()
 
 
 def test_only_the_named_command_is_imported() -> None:
     code = "import sys, experiments.cli; experiments.cli.parse_command(['track', 'walk']); print(*sys.modules)"
-    found = {name for name in process(code).stdout.split() if name.startswith("experiments.commands.")}
+    found = {name for name in run_python(code).stdout.split() if name.startswith("experiments.commands.")}
     assert found == {"experiments.commands.track"}
 
 
 def test_compilation_listener_reports_compiled_functions() -> None:
-    assert "compiles smooth_step" in compiled(process(TELLS + _COMPILES))
+    assert "compiles smooth_step" in compiled_names(run_python(LISTENER + _COMPILES))
 
 
 def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
     """As certification does with the program of a run."""
-    for completed in (process(TELLS + _EVALUATE_LAW), process(TELLS + _EVALUATE_LAW)):
+    for completed in (run_python(LISTENER + _EVALUATE_LAW), run_python(LISTENER + _EVALUATE_LAW)):
         assert float(completed.stdout) > 0.0
-    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled(completed)).split())
+    assert not {"follow_wrench", "evaluate"} & set(" ".join(compiled_names(completed)).split())
 
 
 @pytest.fixture(scope="module")
@@ -67,22 +68,26 @@ def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> None:
-    completed = process(TELLS + RUNS, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    completed = run_python(LISTENER + COMMAND, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
     assert "The stylus ran" in completed.stdout
-    assert compiled(completed) == []
+    assert compiled_names(completed) == []
 
 
+# In a separate process, for the peak memory of a process never decreases.
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [(), ("--map", "lifted"), ("--map", "lifted", "--expressive", "--walls")],
     ids=["cylinder", "lifted", "expressive"],
 )
-def test_run_compiles_nothing_in_its_own_process(arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path) -> None:
+def test_run_compiles_nothing_in_its_own_process_and_needs_less_than_1_gb(
+    arguments: tuple[str, ...], lifted_file: Path, tmp_path: Path
+) -> None:
     given = [str(lifted_file) if argument == "lifted" else argument for argument in arguments]
-    completed = process(TELLS + RUNS, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
+    completed = run_python(LISTENER + COMMAND, "run", *given, "--seconds", "0.1", "--out", str(tmp_path / "run"))
     assert "The stylus ran" in completed.stdout
-    assert compiled(completed) == []
+    assert compiled_names(completed) == []
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["speed"]["peak_memory_mb"] < 1000.0
 
 
 @pytest.mark.slow

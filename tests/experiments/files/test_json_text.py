@@ -33,6 +33,7 @@ def test_non_finite_numbers_become_null() -> None:
     }
 
 
+@pytest.mark.usefixtures("without_page")
 def test_infinite_configuration_values_are_strict_json_in_all_run_files(tmp_path) -> None:
     words = ["--figure", "none", "--walls", "--joint-speed", "inf", "--tube", "inf", "--seconds", "0.1"]
     assert main(["run", *words, "--out", str(tmp_path)]) == 0

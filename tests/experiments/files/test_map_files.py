@@ -108,8 +108,8 @@ def test_file_of_another_content_is_refused(tmp_path):
     path.with_suffix(".npy").rename(path)
     with pytest.raises(SimError, match="is not a map file"):
         load_map(path)
-    what = r"missing\.npz: cannot be read \(No such file or directory\); expected the \.npz file of a map"
-    with pytest.raises(SimError, match=what):
+    message = r"missing\.npz: cannot be read \(No such file or directory\); expected the \.npz file of a map"
+    with pytest.raises(SimError, match=message):
         load_map(tmp_path / "missing.npz")
 
 

@@ -39,20 +39,22 @@ def test_symbolic_link_is_preserved(tmp_path: Path) -> None:
     assert path.read_text(encoding="utf-8").startswith("{")
 
 
-def _interrupted(path: Path, what: Any) -> None:
+def _interrupted(path: Path, interruption: Any) -> None:
     with atomic_file(path) as file:
         file.write(b"half")
-        raise what
+        raise interruption
 
 
-@pytest.mark.parametrize("what", [KeyboardInterrupt, MemoryError, OSError(errno.ENOSPC, "No space left on device")])
+@pytest.mark.parametrize(
+    "interruption", [KeyboardInterrupt, MemoryError, OSError(errno.ENOSPC, "No space left on device")]
+)
 @pytest.mark.parametrize("before", [None, b"old"])
-def test_interrupted_write_keeps_the_old_content(tmp_path: Path, before: bytes | None, what: Any) -> None:
+def test_interrupted_write_keeps_the_old_content(tmp_path: Path, before: bytes | None, interruption: Any) -> None:
     path = tmp_path / "map.npz"
     if before is not None:
         path.write_bytes(before)
-    with pytest.raises(what if isinstance(what, type) else OSError):
-        _interrupted(path, what)
+    with pytest.raises(interruption if isinstance(interruption, type) else OSError):
+        _interrupted(path, interruption)
     assert [entry.read_bytes() for entry in tmp_path.iterdir()] == ([] if before is None else [before])
 
 

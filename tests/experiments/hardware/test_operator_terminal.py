@@ -24,11 +24,11 @@ class ScriptedRun:
     """A run without processes: requests take effect at once, and a script has further events by poll number."""
 
     def __init__(self, script: Script):
-        self.script, self.looks, self.asked = script, 0, list[int]()
+        self.script, self.looks, self.requests = script, 0, list[int]()
         self.state, self.fault, self.recorded = State.DISARMED, Fault.NONE, None
 
     def request(self, event: int) -> None:
-        self.asked.append(event)
+        self.requests.append(event)
         if event == CLEAR:
             self.state, self.fault = State.DISARMED, Fault.NONE
         elif self.state is not State.FAULT:
@@ -68,7 +68,7 @@ def requests_of(script: Script, arm: bool = False) -> list[int]:
     """Requests to a run that ends with Ctrl-C, unless the script ends it before."""
     stand = ScriptedRun(script | {30: _interrupt})
     attend(stand, 60.0, SimpleNamespace(arm=arm, dead_man=True), Console(quiet=True))  # type: ignore[arg-type]
-    return stand.asked
+    return stand.requests
 
 
 def _interrupt(stand: ScriptedRun) -> None:
@@ -110,7 +110,7 @@ def test_enter_after_a_fault_clears_it(type_keys) -> None:
 def test_end_of_input_ends_the_run_without_arming(type_keys) -> None:
     stand = ScriptedRun({3: lambda _: type_keys(b"\x04")})
     attend(stand, 60.0, SimpleNamespace(arm=False, dead_man=True), Console(quiet=True))
-    assert stand.asked == [DISARM]
+    assert stand.requests == [DISARM]
     assert stand.looks < 10
 
 

@@ -7,16 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
-
 ROOT = Path(__file__).resolve().parents[3]
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(out)]) == 0
-    return out
 
 
 def _draw(out: Path, picture: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -29,9 +20,11 @@ def _draw(out: Path, picture: Path, **environment: str) -> subprocess.CompletedP
 
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", [None, "glfw", "bogus"])
-def test_picture_is_drawn_without_display_for_any_mujoco_gl(backend: str | None, run: Path, tmp_path: Path) -> None:
+def test_picture_is_drawn_without_display_for_any_mujoco_gl(
+    backend: str | None, run_folder: Path, tmp_path: Path
+) -> None:
     picture = tmp_path / "x.png"  # a new file, for existing ones are not replaced
-    completed = _draw(run, picture) if backend is None else _draw(run, picture, MUJOCO_GL=backend)
+    completed = _draw(run_folder, picture) if backend is None else _draw(run_folder, picture, MUJOCO_GL=backend)
     assert "Traceback" not in completed.stderr
     if completed.returncode == 2:  # a machine without EGL and OSMesa
         assert "expected EGL or OSMesa: apt-get install" in completed.stderr

@@ -6,15 +6,13 @@ from pathlib import Path
 import h5py
 import pytest
 
-from experiments.cli import main
 from tests.experiments.refused_command import refused
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(out)]) == 0
-    return out
+@pytest.fixture
+def spoiled(run_folder: Path, tmp_path: Path) -> Path:
+    """A copy of the run to spoil."""
+    return shutil.copytree(run_folder, tmp_path / "run")
 
 
 READERS = (["report"], ["reproduce"], ["certify"], ["render"], ["picture"])
@@ -22,11 +20,9 @@ READERS = (["report"], ["reproduce"], ["certify"], ["render"], ["picture"])
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader[0])
 def test_truncated_recording_is_refused(
-    reader: list[str], run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    reader: list[str], spoiled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoiled = tmp_path / "run"
-    shutil.copytree(run, spoiled)
-    (spoiled / "run.h5").write_bytes((run / "run.h5").read_bytes()[:200_000])
+    (spoiled / "run.h5").write_bytes((spoiled / "run.h5").read_bytes()[:200_000])
     target = [str(tmp_path / "x.png")] if reader == ["picture"] else []
     stderr = refused([*reader, str(spoiled), *target], capsys)
     assert "run.h5: not a recording, cut short: 200000 bytes of " in stderr
@@ -34,10 +30,8 @@ def test_truncated_recording_is_refused(
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader[0])
 def test_recording_with_missing_rows_is_refused_with_the_channel(
-    reader: list[str], run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    reader: list[str], spoiled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoiled = tmp_path / "run"
-    shutil.copytree(run, spoiled)
     with h5py.File(spoiled / "run.h5", "r+") as file:
         file["ticks/force"].resize(100, axis=0)
     target = [str(tmp_path / "x.png")] if reader == ["picture"] else []
@@ -50,20 +44,14 @@ def test_recording_with_missing_rows_is_refused_with_the_channel(
     [("static/curve", "no array or text curve; there are"), ("ticks/p", "no channel ticks/p; there are")],
 )
 def test_missing_channel_or_array_is_named(
-    missing: str, message: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    missing: str, message: str, spoiled: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    spoiled = tmp_path / "run"
-    shutil.copytree(run, spoiled)
     with h5py.File(spoiled / "run.h5", "r+") as file:
         del file[missing]
     assert f"run.h5: {message}" in refused(["report", str(spoiled)], capsys)
 
 
-def test_recording_with_missing_frames_is_not_reproduced(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    spoiled = tmp_path / "run"
-    shutil.copytree(run, spoiled)
+def test_recording_with_missing_frames_is_not_reproduced(spoiled: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with h5py.File(spoiled / "run.h5", "r+") as file:
         for name in ("t", "qpos"):
             file["frames"][name].resize(100, axis=0)

@@ -41,20 +41,13 @@ def test_study_refuses_a_folder_with_other_results(tmp_path: Path) -> None:
     assert not (tmp_path / "study.sqlite").exists()
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("runs") / "run"
-    assert main(["run", "--figure", "none", "--seconds", "1", "--out", str(out)]) == 0
-    return out
-
-
-def test_concurrent_run_into_one_folder_is_refused(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    descriptor = os.open(run, os.O_RDONLY)
+def test_concurrent_run_into_one_folder_is_refused(run_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    descriptor = os.open(run_folder, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)  # as a run in another process would
-        command = ["run", "--figure", "none", "--seconds", "1", "--out", str(run), "--overwrite"]
+        command = ["run", "--figure", "none", "--seconds", "1", "--out", str(run_folder), "--overwrite"]
         assert "another run is being written into it" in refused(command, capsys)
-        assert (run / "run.h5").exists()
+        assert (run_folder / "run.h5").exists()
     finally:
         os.close(descriptor)  # as at the end of a process that crashes
     assert main(command) == 0

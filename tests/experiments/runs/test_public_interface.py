@@ -14,18 +14,7 @@ import hvf
 from experiments.cli import main
 from experiments.files.device_files import save_device
 from experiments.results.folder import locked_folder
-
-CURVE = hvf.circle(lap=2.0)
-
-
-@hvf.law
-def level(hand, k=50.0):
-    return (0.0, 0.0, -k * hand.p[2])
-
-
-def simulation(field: hvf.Law, **parts: object) -> hvf.Simulation:
-    around = hvf.Cylindrical(hvf.clips("cheer"), around=CURVE)
-    return hvf.Simulation(field=field, haptic_map=around, **parts)  # pyright: ignore[reportArgumentType]
+from tests.experiments.runs.simulations import CURVE, level, simulation
 
 
 def test_every_name_in_all_exists() -> None:
@@ -87,11 +76,11 @@ class Shrinking(hvf.HapticMap):
     """A map whose poses have the wrong size after some calls."""
 
     def __init__(self) -> None:
-        self.asked = 0
+        self.calls = 0
 
     def pose(self, x: np.ndarray, memory: np.ndarray | None = None) -> np.ndarray:
-        self.asked += 1
-        return hvf.rest_pose()[: 75 if self.asked < 30 else 3]
+        self.calls += 1
+        return hvf.rest_pose()[: 75 if self.calls < 30 else 3]
 
 
 def test_failing_own_map_is_reported_and_leaves_no_folder(monkeypatch, tmp_path: Path) -> None:

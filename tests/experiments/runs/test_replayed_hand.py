@@ -19,7 +19,7 @@ from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from tests.experiments.runs.test_public_interface import CURVE, simulation
+from tests.experiments.runs.simulations import CURVE, simulation
 
 SECONDS = 1.5  # longer than the settling time of a released hand
 HAND = ("t", "p", "quaternion", "v", "omega", "switch")

@@ -1,4 +1,4 @@
-"""Simulations from Python: the example script, runs in memory, ticks, own maps that fail, replay in a notebook."""
+"""Simulations from Python: runs in memory, their results, sweeps, ticks, own maps that fail, replay in a notebook."""
 
 from pathlib import Path
 
@@ -7,40 +7,31 @@ import pytest
 
 import hvf
 
-EXAMPLE = Path(__file__).with_name("interface_example.py").read_text(encoding="utf-8")
-
-
-@pytest.mark.slow
-def test_example_script_runs_unchanged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    exec(compile(EXAMPLE, "interface_example", "exec"), names)
-    run = names["run"]
-    assert isinstance(run, hvf.Run)
-    assert run.summary.path.deviation_rms < 1e-3
-    assert run.ticks["force"].shape == (20000, 3)
-    assert hvf.load("edited.bvh").duration == pytest.approx(20.0, abs=0.1)
-    assert {"force_0", "p_2"} <= set(run.frame().columns)
-    last = names["r"]
-    assert isinstance(last, hvf.Swept)
-    assert last.values == {"field.k_r": 800}
-    assert "so is any switching between them" in capsys.readouterr().out  # of the cases of the floor
-
-
-@pytest.fixture(scope="module")
-def sim() -> hvf.Simulation:
-    curve = hvf.circle(lap=2.0)
-    return hvf.Simulation(
-        field=hvf.Follow(curve, k_r=300, b_d=8), haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=curve),
-        figure=hvf.Figure(kind="none"),
-    )  # fmt: skip
-
 
 @pytest.fixture(scope="module")
 def run(sim: hvf.Simulation) -> hvf.Run:
     return sim.run(0.5)
+
+
+def test_run_gives_measures_channels_animation_page_and_table(tmp_path: Path) -> None:
+    curve = hvf.circle(radius=0.0477, lap=2.0)
+    run = hvf.Simulation(
+        device=hvf.Phantom(), field=(hvf.Follow(curve, k_r=300, b_d=8) + hvf.law(lambda hand: (0, 0, 0))).limited(8.0),
+        haptic_map=hvf.Cylindrical(hvf.clips("walk", "jump"), around=curve), figure=hvf.Figure(kind="kinematic"),
+        user=hvf.User(pushes=[hvf.Push(at=2.5, seconds=0.5, force=2.5)]), seed=1,
+    ).run(4.0)  # fmt: skip
+    assert isinstance(run, hvf.Run)
+    assert run.summary.path.deviation_rms < 1e-3
+    assert run.ticks["force"].shape == (4000, 3)
+    assert hvf.load(run.to_bvh(tmp_path / "edited.bvh")).duration == pytest.approx(4.0, abs=0.1)
+    assert run.report().stat().st_size > 1e5
+    assert {"force_0", "p_2"} <= set(run.frame().columns)
+
+
+def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
+    *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.1, threads=2)
+    assert isinstance(last, hvf.Swept)
+    assert last.values == {"field.k_r": 800}
 
 
 def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
@@ -67,7 +58,7 @@ def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pyt
         field=hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8), haptic_map=Failing(),
         figure=hvf.Figure(kind="kinematic"),
     )  # fmt: skip
-    with pytest.raises(Exception, match="beyond what this map"):
+    with pytest.raises(ValueError, match="beyond what this map"):
         moves.run(0.5)
     assert not list(tmp_path.iterdir())
 

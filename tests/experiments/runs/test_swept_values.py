@@ -1,24 +1,11 @@
 """Numbers of a simulation that a sweep or a search sets, by their path."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 import hvf
 from experiments.runs.sweep import with_values
-
-CURVE = hvf.circle(lap=2.0)
-
-
-@hvf.law
-def level(hand, k=50.0):
-    return (0.0, 0.0, -k * hand.p[2])
-
-
-def simulation(field: hvf.Law, **parts: object) -> hvf.Simulation:
-    around = hvf.Cylindrical(hvf.clips("cheer"), around=CURVE)
-    return hvf.Simulation(field=field, haptic_map=around, **parts)  # pyright: ignore[reportArgumentType]
+from tests.experiments.runs.simulations import CURVE, level, simulation
 
 
 def test_gain_of_one_law_in_a_composed_field_is_set() -> None:
@@ -94,14 +81,6 @@ def test_invalid_sweep_tuning_or_record_arguments_are_refused() -> None:
     for bounds in ((500.0, 50.0), (50.0,), (50.0, float("inf"))):
         with pytest.raises(hvf.ParameterError, match=r"^field\.k_r is .*expected the lowest and the highest value"):
             hvf.tune(sim, {"field.k_r": bounds}, lambda run: 1.0)  # pyright: ignore[reportArgumentType]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cost", [float("nan"), None, (1.0, 2.0)])
-def test_non_numeric_cost_ends_the_search(cost: Any) -> None:
-    sim = simulation(hvf.Follow(CURVE, k_r=300, b_d=8))
-    with pytest.raises(hvf.ParameterError, match=r"^the cost at {'field\.k_r': .*expected 1 finite"):
-        hvf.tune(sim, {"field.k_r": (100.0, 101.0)}, lambda run: cost, seconds=0.1, search=hvf.Search(candidates=1))
 
 
 def test_number_within_a_sequence_is_refused() -> None:

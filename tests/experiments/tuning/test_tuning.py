@@ -219,7 +219,7 @@ def test_cached_verdict_equals_the_computed_one_and_follows_the_gain() -> None:
 
 @pytest.mark.slow
 def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
-    config = tuning(candidates=4, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
+    config = tuning(candidates=2, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
     found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))
     config_of_run = load_config(tmp_path / CHOSEN)
     assert config_of_run.mode.stiffness == found.values["stiffness"]  # pyright: ignore
@@ -235,7 +235,7 @@ def test_python_search_resumes_only_its_own_candidates(tmp_path: Path) -> None:
 
     def found(damping: float, cost: Callable[[hvf.Run], float]) -> TunedSimulation:
         field = hvf.Follow(curve, k_r=300, b_d=damping).limited(8.0)
-        sim = hvf.Simulation(field=field, haptic_map=walk)
+        sim = hvf.Simulation(field=field, haptic_map=walk, figure=hvf.Figure(kind="none"))
         return hvf.tune(sim, space, cost, seconds=0.2, search=search)
 
     first = found(8.0, lambda run: 1.0)

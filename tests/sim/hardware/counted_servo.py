@@ -1,4 +1,4 @@
-"""A servo whose heap calls per tick are counted: run with `heap_calls.c` preloaded.
+"""Servos whose heap calls per tick are counted, one a device: run with `heap_calls.c` preloaded.
 
 With PYTHONMALLOC=malloc Python allocates through the same functions as compiled code, NumPy, MuJoCo and libc, so that
 no allocation is hidden in a pool.
@@ -142,15 +142,18 @@ class CountedServo(ServoProcess):
 
 
 if __name__ == "__main__":
-    servo = CountedServo(DEVICES[sys.argv[1]](*sys.argv[2:]))
-    servo.run()
-    counted = servo.heap.heap_calls()
-    servo.heap.heap_open()
-    [float(k) for k in range(1000)]
-    servo.heap.heap_close()
-    print(servo.ticker.state.name, counted, servo.heap.heap_calls() - counted)
-    print(servo.ticker.fault, file=sys.stderr)
-    servo.close()
-    servo.device.driver.close()
-    for shared in (servo.orders, servo.status, servo.rows):
-        shared.close()
+    for argument in sys.argv[1:]:
+        name, *library = argument.split("=")
+        servo = CountedServo(DEVICES[name](*library))
+        before = servo.heap.heap_calls()
+        servo.run()
+        counted = servo.heap.heap_calls()
+        servo.heap.heap_open()
+        [float(k) for k in range(1000)]
+        servo.heap.heap_close()
+        print(name, servo.ticker.state.name, counted - before, servo.heap.heap_calls() - counted)
+        print(name, servo.ticker.fault, file=sys.stderr)
+        servo.close()
+        servo.device.driver.close()
+        for shared in (servo.orders, servo.status, servo.rows):
+            shared.close()

@@ -1,5 +1,6 @@
 """Clip changes computed before a run: they begin at a gate and end in the other clip, without jumps."""
 
+import json
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import SimpleNamespace
@@ -22,8 +23,9 @@ from experiments.setups.parts.clips import load_clips
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip, pose_difference
+from sim.recording.recording import Recording
 from sim.reference.reference import make_reference, map_poses, reference_along
-from tests.experiments.own_process import RUNS, TELLS, compiled, process
+from tests.experiments.own_process import COMMAND, LISTENER, compiled_names, run_python
 from tests.sim.gliding_hand import gliding_hand
 
 LAP, PERIOD = 3.4, 2e-3
@@ -171,28 +173,49 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
 
 
 @pytest.fixture(scope="module")
-def run_with_changes(tmp_path_factory: pytest.TempPathFactory) -> CompletedProcess[str]:
-    """A run of three clips in a separate process, which computes the changes and caches them."""
-    words = (
-        "run",
-        "--mode",
-        "rivers",
-        "--map",
-        "rivers",
-        "--clips",
-        *DISTINCT_CLIPS,
-        "--lap",
-        f"{LAP}",
-        "--seconds",
-        "0.1",
-    )
-    return process(TELLS + RUNS, *words, "--out", str(tmp_path_factory.mktemp("rivers") / "run"))
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("rivers") / "run"
+
+
+@pytest.fixture(scope="module")
+def run_with_changes(run_folder: Path) -> CompletedProcess[str]:
+    """A pushed hand among the rivers of three clips: a separate process computes the changes and caches them."""
+    rivers = ("--mode", "rivers", "--map", "rivers", "--clips", *DISTINCT_CLIPS, "--lap", f"{LAP}")
+    return run_python(LISTENER + COMMAND, "run", *rivers, "--user", "push", "--seconds", "6", "--out", str(run_folder))
 
 
 @pytest.mark.slow
 def test_run_with_changes_compiles_nothing_in_its_own_process(run_with_changes: CompletedProcess[str]) -> None:
     assert "The stylus ran" in run_with_changes.stdout
-    assert compiled(run_with_changes) == []
+    assert compiled_names(run_with_changes) == []
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("run_with_changes")
+def test_river_switch_is_recorded_at_its_time(run_folder: Path) -> None:
+    summary = json.loads((run_folder / "summary.json").read_text())
+    assert "level → wave" in "\n".join(summary["lines"])
+    with Recording(run_folder / "run.h5") as recording:
+        river, t = recording.channel("ticks", "river")[:], recording.channel("ticks", "t")[:]
+    first = int(np.flatnonzero(np.diff(river))[0])
+    assert (river[first], river[first + 1]) == (0.0, 1.0)
+    # Half way round the level river.
+    assert LAP / 2 - 0.1 < t[first] < LAP / 2 + 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("run_with_changes")
+def test_animation_has_no_jump_and_the_figure_stands(run_folder: Path) -> None:
+    summary = json.loads((run_folder / "summary.json").read_text())
+    with Recording(run_folder / "run.h5") as recording:
+        reference = recording.channel("frames", "reference")[:]
+        period = 1.0 / recording.rates["frames"]
+    rate = pose_difference(reference[:-1], reference[1:]) / period
+    # Within what a clip does: without inertialisation a joint turns by more than 100 rad/s at a change.
+    assert np.abs(rate[:, 6:]).max() < 20.0
+    assert np.abs(rate[:, :3]).max() < 2.5
+    assert summary["figure"]["fell_at"] is None
+    assert summary["figure"]["joint_error_rms_deg"] < 4.0
 
 
 @pytest.mark.slow

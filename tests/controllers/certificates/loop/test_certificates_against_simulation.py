@@ -39,7 +39,7 @@ def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
 
 def test_onset_of_instability_is_at_the_predicted_stiffness():
     rng = np.random.default_rng(11)
-    trials = [draw_trial(rng) for _ in range(6)]
+    trials = [draw_trial(rng) for _ in range(4)]
     errors = [abs(observed(trial, predicted(trial), Conditions()) / predicted(trial) - 1.0) for trial in trials]
     assert max(errors) < 0.05
     assert np.median(errors) < 0.02
@@ -83,7 +83,7 @@ def test_spring_that_refutes_passivity_destabilises_the_loop():
     example = passivity(RIVER).counterexample
     trial = _trial(RIVER, example["phase"], example["hand"])
     # The spring acts at every physics step, so the steps must be fine.
-    path = simulate(trial, RIVER.k_r, 300, Conditions(substeps=1024), 1e-3 * example["state"])
+    path = simulate(trial, RIVER.k_r, 150, Conditions(substeps=1024), 1e-3 * example["state"])
     assert np.log(growth(path)) / 1e-3 == pytest.approx(example["growth_rate"], rel=0.1)
 
 

@@ -26,15 +26,15 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
     """Files that were prepared, by a fast replacement of the preparation."""
     found: list[Path] = []
 
-    class Made:
+    class QuickPreparation:
         def __init__(self, path: Path):
             found.append(path)
             loaded = load(path).clip
             self.near = path.stem != "cartwheel"
             self.clip = Clip(loaded.poses[::2], loaded.fps / 2.0, loaded.name)
 
-    Made.__module__ = prepare.__name__
-    monkeypatch.setattr(prepare, "prepared", Made)
+    QuickPreparation.__module__ = prepare.__name__
+    monkeypatch.setattr(prepare, "prepared", QuickPreparation)
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path / "cache"))
     return found
 

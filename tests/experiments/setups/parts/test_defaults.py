@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import pytest
+
 from experiments.cli import main, parse_command
 
 
+@pytest.mark.usefixtures("without_page")
 def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> None:
     """Default pushes are written out, so that a run of the file repeats them."""
     from experiments.config.run_config import load_config

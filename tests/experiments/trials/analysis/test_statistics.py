@@ -60,16 +60,16 @@ def test_holm_correction_covers_all_contrasts() -> None:
 @pytest.mark.slow
 def test_interval_coverage_with_user_specific_effects() -> None:
     covered = np.zeros(2)
-    for seed in range(40):
+    for seed in range(24):
         table = frame(-0.2, 12, seed)
         table["tracking_error"] += (table["guidance"] == "river") * np.random.default_rng(seed).normal(size=12)[
             table["user"]
         ]
         (c,) = statistics(table, {"guidance": FACTORS["guidance"]}, (), ["tracking_error"], 1).contrasts
         covered += [c.low <= -0.2 <= c.high, c.model_low <= -0.2 <= c.model_high]
-    # Of 95 %, less than 33 of 40 has a chance of 1 in 2000; a bootstrap of twelve users is a little narrow. Repetitions
-    # taken for users would hold it in 15 of 40.
-    assert np.all(covered >= 33)
+    # Of 95 %, less than 19 of 24 has a chance of 1 in 1000; a bootstrap of twelve users is a little narrow. Repetitions
+    # taken for users would hold it in 9 of 24.
+    assert np.all(covered >= 19)
 
 
 def test_between_user_factor_is_compared_between_users() -> None:

@@ -8,6 +8,7 @@ from experiments.flights.ballistics import clip_flights
 from experiments.preparation import prepared_clip
 from experiments.preparation.command import prepare_file
 from experiments.preparation.prepared_file import advice, summary
+from experiments.preparation.tracking_trial import followed
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
@@ -428,7 +429,8 @@ def test_whole_file_longer_than_120_s_is_refused(long_walk):
 
 
 @pytest.mark.slow
-def test_prepare_command_prints_missing_joints_and_dropped_frames(tmp_path, capsys):
+def test_prepare_command_prints_missing_joints_and_dropped_frames(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
     walk = embedded("walk")
     write_rig(Rig(without=("clavicle",), leading=1), Clip(walk.poses[::4], walk.fps / 4, "walk"), tmp_path / "r.bvh")
     assert main(["prepare", str(tmp_path / "r.bvh"), str(tmp_path / "out.bvh")]) == 0
