@@ -23,7 +23,7 @@ from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, largest_angle, write_rig
 
 FAST_CLIPS = ("spin", "jump", "run", "backflip", "squat_dance")
-RATES = (20.0, 30.0)
+RATES = (20.0, 25.0, 30.0)
 UP = Hints(up="+Y")  # which somersaults do not reveal
 
 
