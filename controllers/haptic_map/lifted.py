@@ -166,7 +166,7 @@ class Lifted(ClipMap):
         """A remark if only some joints are blended."""
         if self.legs_of is None:
             return ()
-        owner, arms = self.names[self.legs_of], "the others' arms"
+        owner, arms = self.names[self.legs_of], "the others' arm motion"
         what = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
         return (f"legs and trunk are those of {owner} wherever the hand is pushed, with {what}",)
 
