@@ -33,8 +33,8 @@ from experiments.config.modes import JointWalls
 from experiments.config.options import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
+from experiments.setups.modes.fixed_curve import figure_walls
 from experiments.setups.parts.clips import load_clips
-from experiments.setups.parts.walls import figure_walls
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model

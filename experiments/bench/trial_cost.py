@@ -19,7 +19,7 @@ from experiments.trials.design.plan import Trial, plan_trials
 from experiments.trials.design.study_config import StudyConfig, parse_study
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps, run_missing
-from experiments.trials.execution.threads import Threads
+from experiments.trials.execution.executors import Threads
 from experiments.trials.trial.run_trial import MAP_CACHE, Row, Task
 
 _THREAD_COUNT, _SHORT_TIME, _SHORT_COUNT = 2, 0.02, 2_000  # simultaneous trials; short trials: duration [s] and number

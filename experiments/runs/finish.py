@@ -11,8 +11,7 @@ from experiments.results.pages.report_of import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import session_summary, write_animations, write_summary
 from experiments.setups.wiring import wire
-from sim.loop.loop import Loop
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import Loop, peak_memory_mb
 from sim.recording.recording import Recording
 
 

@@ -21,12 +21,12 @@ from experiments.setups.maps.about_circle import check_clips
 from experiments.setups.maps.composite import PARTS, composite_parts
 from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
 from experiments.setups.maps.map_file import lifted_parts
-from experiments.setups.maps.of_stature import for_size_of
 from experiments.setups.maps.place import Place
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
+from experiments.setups.setups import for_size_of
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.world.world import World

@@ -4,7 +4,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from rich.console import Console
@@ -38,15 +38,15 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from sim.loop.channels import groups, record_into, shown_configuration
-from sim.loop.clock import RealTime
-from sim.loop.loop import BLOCK_SECONDS, Loop
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
 from sim.viewer.courses import courses
-from sim.viewer.page import NullPage, Page
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, RealTime
+
+if TYPE_CHECKING:
+    from sim.viewer.live_page import LivePage
 
 BVH_FPS = 50.0  # [1/s]
 VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
@@ -139,11 +139,13 @@ def _simulate(
 ) -> SpeedSummary:
     servo = session.servo
     record = record_into(recorder, servo, session.world)
-    page = _live_page(session) if view else NullPage()
+    page = _live_page(session) if view else None
     clock, simulated = RealTime(), session.world.simulates_figure
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         record(ticks, frames, n)
+        if page is None:
+            return
         hand = ticks.hand[n - 1]
         page.show(
             Moment(
@@ -171,12 +173,13 @@ def _simulate(
 
         with session.naming_laws():
             times = loop.run(rest, progress)
-    page.close()
+    if page is not None:
+        page.close()
     store_duration(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
 
 
-def _live_page(session: Session) -> Page:
+def _live_page(session: Session) -> "LivePage":
     from sim.viewer.live_page import LivePage  # importing viser takes a third of a second, and is rarely needed
 
     static = session.static()

@@ -1,16 +1,17 @@
 """Registry of set-ups: the functions that make the parts of a run, by kind of mode and kind of map."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import mujoco
 
 from experiments.config.maps import Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
+from experiments.fitting.blendable import longest_flight
 from experiments.setups.maps.composite import composite_setup
 from experiments.setups.maps.cylindrical import cylindrical_setup
 from experiments.setups.maps.map_file import map_file_setup
-from experiments.setups.maps.of_stature import for_size_of
 from experiments.setups.maps.river_clips import river_clips_setup
 from experiments.setups.maps.robot_arm import robot_arm_parts
 from experiments.setups.modes.bunny import bunny_parts
@@ -21,6 +22,7 @@ from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import ClipMapParts, MapParts, Parts
+from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
@@ -73,3 +75,22 @@ def map_parts(config: RunConfig, body: mujoco.MjModel, clips: tuple[Clip, ...] |
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:
     """Parts of a run: its mode's set-up applied to the map's parts."""
     return MODE_SETUPS[config.mode.kind](config, config.mode, maps)
+
+
+def for_size_of(figure: mujoco.MjModel, made: Callable[[mujoco.MjModel], ClipMapParts]) -> ClipMapParts:
+    """Map parts of a figure of any stature: made for the default stature, which is that of the clips, and scaled.
+
+    Lengths scaled by s at the same times scale accelerations by s, while gravity stays: a flight of the scaled motion
+    is ballistic at 1/√s of its own pace (equal Froude number, Alexander 1989, *Optimization and gaits in the locomotion
+    of vertebrates*, Physiol. Rev. 69, 1199-1227).
+    """
+    size = proportion(figure)
+    if size == 1.0:
+        return made(figure)
+    parts = made(figure_model())
+    flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
+    remark = (
+        f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
+        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' own pace"
+    )
+    return replace(parts, size=size, remarks=parts.remarks + ((remark,) if flying else ()))

@@ -6,7 +6,7 @@ from pathlib import Path
 import optuna
 from optuna.storages.journal import JournalFileBackend
 
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 
 
 def storage_of(where: str | Path) -> optuna.storages.BaseStorage:

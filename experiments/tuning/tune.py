@@ -127,7 +127,7 @@ def tune(
     """
     import optuna  # an optional dependency, which takes half a second to import
 
-    from experiments.tuning.samplers import MAX_PROPOSALS_RATIO
+    from experiments.tuning.search import MAX_PROPOSALS_RATIO
 
     check_kind("sim", sim, Simulation)
     check_kind("panel", panel, Sequence[User])
@@ -208,7 +208,7 @@ def _create_study(search: Search, name: str) -> Any:
 
 
 def _ask_candidate(study: Any, search: Search, distributions: Mapping[str, Any], number: int) -> Any:
-    from experiments.tuning.samplers import sampler_of
+    from experiments.tuning.search import sampler_of
 
     study.sampler = sampler_of(search.sampler, search.seed, number)
     return study.ask(dict(distributions))

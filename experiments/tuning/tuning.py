@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from experiments.certify.certify import certify_into
 from experiments.config.part import to_json
 from experiments.files.json_text import json_text
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps
 from experiments.trials.execution.executors import executor

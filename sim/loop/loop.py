@@ -1,10 +1,12 @@
 """A run: compiled blocks of servo ticks one after the other, streamed to a recorder in constant memory."""
 
+import resource
 import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +38,22 @@ class RunTimes(NamedTuple):
     def real_time_factor(self) -> float:
         """Simulated time divided by wall-clock time."""
         return self.simulated / self.wall if self.wall > 0.0 else float("inf")
+
+
+_STATUS = Path("/proc/self/status")
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far [MB].
+
+    Linux reports it in ``/proc/self/status`` (VmHWM, man 5 proc). Its ``getrusage`` would include the peak that the
+    parent had reached when it started this process.
+    """
+    if _STATUS.exists():
+        line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))
+        return int(line.split()[1]) / 1e3
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:

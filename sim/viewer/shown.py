@@ -1,5 +1,6 @@
-"""The data of a moment of a run that is displayed."""
+"""A moment of a run that is displayed, and simulated time kept in step with the clock of a person who watches."""
 
+import time
 from typing import NamedTuple
 
 from controllers.state import Array
@@ -29,3 +30,22 @@ class Moment(NamedTuple):
     force: Array
     user: Array
     target: Array
+
+
+class RealTime:
+    """Sleeps until the wall clock has caught up with the simulated time.
+
+    The clock starts with the first wait. A simulation that is late is not made to catch up: the origin of the wall
+    clock is moved instead.
+    """
+
+    def __init__(self) -> None:
+        self._origin: float | None = None
+
+    def wait_until(self, t: float) -> None:
+        """Sleep until the wall clock reaches simulated time t [s]."""
+        now = time.monotonic()
+        if self._origin is None or now - self._origin > t:
+            self._origin = now - t
+        else:
+            time.sleep(self._origin + t - now)

@@ -4,9 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.orientation import Orientation
+from controllers.fields.soft_wall import SoftWall
+from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import stylus_path
@@ -17,7 +22,7 @@ from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import tank_for
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
-from experiments.setups.parts.walls import figure_walls
+from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
 
 TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
@@ -107,3 +112,24 @@ def with_moment(program: Program, moment: OrientationMoment | None, course: Traj
         return program
     law = Orientation(course, moment.orientation_stiffness, moment.orientation_damping, tube)
     return program + law.program()
+
+
+DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
+
+
+def figure_walls(haptic_map: HapticMap, stiffness: float, margin: float, speed: float) -> SoftWall:
+    """A field that repels the hand from the limits of the figure's joints and from joint speeds above `speed` [rad/s].
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval.
+    """
+    n, narrowest = len(JOINTS), float(np.diff(joint_range(), axis=2).min())
+    if margin > 0.5 * narrowest:
+        raise ParameterError(
+            f"--wall-margin is {margin:g} rad; expected at most {np.floor(500.0 * narrowest) / 1e3:g} rad, half of the "
+            "narrowest range"
+        )
+    columns, rows = range(N_POSE - 4 * n, N_POSE, 4), range(N_TANGENT - 3 * n, N_TANGENT, 3)
+    return SoftWall(haptic_map, tuple(columns), tuple(rows), tuple(joint_range()), stiffness, margin, DAMPING, speed)

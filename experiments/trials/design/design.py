@@ -5,8 +5,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import StudyConfig, Words, check_trials
+from experiments.trials.design.study_config import StudyConfig, StudyError, Words, check_trials
 from experiments.trials.trial.measures import MEASURES
 
 _COLUMNS = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table

@@ -19,8 +19,7 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.design import Condition, DesignTrial, conditions, design_trials
-from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import StudyConfig, Words
+from experiments.trials.design.study_config import StudyConfig, StudyError, Words
 from models.mocap.library import embedded_names
 from sim.compilation.sources import reached_code
 from sim.users.person.person import Person

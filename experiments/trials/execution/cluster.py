@@ -8,8 +8,8 @@ from typing import Any
 
 from experiments.config.part import from_json
 from experiments.config.run_config import RunConfig
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import trial_key
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.run_trial import Row, Task, perform_trial
 
 TASKS_PER_THREAD = (

@@ -12,6 +12,7 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.trials.design.plan import Trial
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.trial.run_trial import MapCache, Row, Task
 
@@ -41,6 +42,31 @@ def _compilation_key(config: RunConfig) -> object:
     """Key of the settings that determine which compiled units and which map a run needs."""
     options = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
     return config.mode.kind, options, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+
+
+_PROBE_FILE = ".hvf"
+
+
+def check_writable(url: str) -> None:
+    """Write an empty file to a folder or URL, and remove it again.
+
+    Raises
+    ------
+    StudyError
+        If nothing can be written there.
+    """
+    try:
+        import fsspec
+
+        system, path = fsspec.core.url_to_fs(url)
+        system.makedirs(path, exist_ok=True)
+        system.pipe_file(f"{path}/{_PROBE_FILE}", b"")
+        system.rm_file(f"{path}/{_PROBE_FILE}")
+    except Exception as error:  # every storage backend has its own exceptions
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise StudyError(
+            f"recordings = {url!r}: {reason}; expected a folder, or a URL that fsspec can write to"
+        ) from None
 
 
 def run_missing(
