@@ -21,12 +21,11 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, HandState, IntArray, stylus_path
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
-from experiments.bench.figure_cost import figure_cost
 from experiments.bench.figures import BenchmarkResult, print_figures
 from experiments.bench.page_cost import picture_microseconds
 from experiments.bench.prepare_cost import prepare_cost
 from experiments.bench.recorder_cost import recorder_cost
-from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
+from experiments.bench.tick_cost import MODES, STEP, figure_cost, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls

@@ -12,8 +12,105 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
 from controllers.gravity import GRAVITY
-from experiments.certify.certificate_words import WORDS
 from experiments.flights.ballistics import ClipBallistics
+
+WORDS: dict[str, tuple[str, str]] = {
+    # stability
+    "radius": ("spectral radius of a period, no hand", ""),
+    "radius_bound": ("spectral radius with its change to the next phase, worst hand", ""),
+    "radius_cut": ("spectral radius where the limiter cuts the force, worst hand", ""),
+    "critical_damping": ("critical damping b_d, no hand", "N s/m"),
+    "delay_margin": ("delay that it bears beyond its own, no hand", "s"),
+    "multiplier": ("largest Floquet multiplier of a lap", ""),
+    "walker_radius": ("spectral radius with the walker as state", ""),
+    "governor_drag": ("drag of the governor", "N s/m"),
+    "governor_certain": ("largest drag that the circle criterion allows", "N s/m"),
+    "governor_radius": ("spectral radius while the governor acts, worst hand", ""),
+    "executed_radius": ("largest spectral radius of the executed program at the states looked at", ""),
+    "executed_force": ("largest force of the executed program there", "N"),
+    # passivity
+    "damping_needed": ("damping of the device that passivity needs", "N s/m"),
+    "damping_needed_unfiltered": ("the same without filter, KT/2 + B", "N s/m"),
+    "frequency": ("frequency that needs it", "rad/s"),
+    # energy
+    "lap_energy": ("energy that a relaxed hand takes in a lap", "J"),
+    "lap_energy_bound": ("bound of the energy in a lap, ideal law", "J"),
+    "power_bound": ("bound of the power, ideal law", "W"),
+    "passive_below": ("frequency below which a vibrating hand gains nothing more", "Hz"),
+    "activity_30": ("power per squared speed of a hand that vibrates with up to 30 Hz", "N s/m"),
+    "activity_100": ("the same up to 100 Hz", "N s/m"),
+    "activity_300": ("the same up to 300 Hz", "N s/m"),
+    "rounding_force": ("force that rounded encoders may add", "N"),
+    "speed_bound": ("bound of the speed along the curve", "m/s"),
+    "peak_gain": ("peak gain from a force to the distance", "m/N"),
+    "force_gain": ("peak gain from a force to the river's", "N/N"),
+    "own_force": ("force that the lap itself asks for", "N"),
+    "push": ("push of the hand", "N"),
+    "push_allowed": ("largest push with a bound", "N"),
+    "distance_bound": ("bound of the distance from the curve", "m"),
+    "force_bound": ("bound of the river's force", "N"),
+    # region
+    "distance": ("offset from which the hand comes back", "m"),
+    "speed": ("wrong speed from which it comes back", "m/s"),
+    "ball": ("distance within which it stays", "m"),
+    "largest_distance": ("largest distance on the way", "m"),
+    "largest_force": ("largest force on the way", "N"),
+    "rate": ("rate at which V falls", "1/s"),
+    "remainder_rate": ("what is left out takes of it", "1/s"),
+    "remainder_drift": ("drift that is left out", "1/s"),
+    "remainder_force": ("force that is left out", "N"),
+    "held_up": ("share of the edge at which it is held up", ""),
+    "level": ("level of V at the edge", ""),
+    "ball_level": ("level of V of the ball", ""),
+    "shift": ("shift of the level by the window", ""),
+    "cells": ("cells that were checked", ""),
+    "cell_slack": ("slack of a cell", ""),
+    "cell_least": ("least of the matrix inequality", ""),
+    "scale": ("scale of offset, speed and filtered speed", "m, m/s, m/s"),
+    "masses": ("lightest and heaviest mass at the tip", "kg"),
+    "alpha": ("α of V", ""),
+    "beta": ("β of V", ""),
+    # switching
+    "score_bound": ("bound of a rival's score", ""),
+    "velocity_noise": ("noise of the velocity by encoders", "m/s"),
+    "hysteresis": ("hysteresis", "m/s"),
+    "hysteresis_dwell": ("least time between two changes by hysteresis", "s"),
+    "least_mismatch": ("least mismatch of a rival's velocity", "m/s"),
+    "rival_weight": ("largest weight of a rival", ""),
+    "common_rate": ("decay a period of the common Lyapunov function", ""),
+    # counterexamples
+    "phase": ("phase of the curve", "s"),
+    "p": ("place of the stylus", "m"),
+    "v": ("velocity of the stylus", "m/s"),
+    "hand": ("hand on the stylus", ""),
+    "state": ("state θ, θ̇, last θ, filtered θ̇", "rad, rad/s"),
+    "growth_rate": ("growth of the mode", "1/s"),
+    "time": ("time at which it happens", "s"),
+    "simulated_time": ("the same in MuJoCo", "s"),
+    "force": ("push of the hand", "N"),
+    "push_start": ("begin of the push", "s"),
+    "push_duration": ("how long it lasts", "s"),
+    "kind": ("what happens", ""),
+    "river": ("number of the river", ""),
+    # clips
+    "start": ("first frame", ""),
+    "end": ("last frame", ""),
+    "frame": ("hardest frame", ""),
+    "position": ("centre of mass at take-off", "m"),
+    "velocity": ("its velocity", "m/s"),
+    "momentum": ("angular momentum", "kg m²/s"),
+    "com": ("centre of mass as the window begins", "m"),
+    "acceleration": ("its mean acceleration", "m/s²"),
+    "clips": ("clips", ""),
+    "floor": ("height of what stands over the floor, median", "m"),
+    "lowest": ("lowest point of the body while supported, from there, 5 %", "m"),
+    "highest": ("the same, 95 %", "m"),
+    "skate": ("furthest that a standing foot slides", "m"),
+    "unheld": ("longest stretch without a foot at rest", "s"),
+    "jump": ("largest acceleration of the centre of mass", "m/s²"),
+}
+"""Name and unit of each number, by its key."""
+
 
 _COLOURS = {"certified": "#2e7d4f", "refuted": "#c2473b", "unknown": "#8a6d1f"}
 _MAX_SHOWN_SIZE = 12  # largest array that the page shows

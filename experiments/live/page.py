@@ -18,9 +18,8 @@ from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import open_cap_hand
 from experiments.live.driver import Driver
-from experiments.live.panels.clock_panel import ClockPanel
+from experiments.live.panels.clock_panel import ClockPanel, add_hand_keys
 from experiments.live.panels.gains_panel import GainsPanel
-from experiments.live.panels.hand_keys import add_hand_keys
 from experiments.live.panels.plots import Plots
 from experiments.live.panels.run_panel import RunPanel
 from experiments.live.panels.status import FIRST_STEPS, status_html

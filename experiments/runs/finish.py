@@ -7,7 +7,7 @@ from rich.console import Console
 from experiments.console.compiling import compiler
 from experiments.results.folder import RECORDING, SUMMARY, clips_of, config_of, locked_folder
 from experiments.results.measures.summary_parts import SpeedSummary
-from experiments.results.pages.report_of import lines_of, write_report_of
+from experiments.results.pages.report import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import session_summary, write_animations, write_summary
 from experiments.setups.wiring import wire

@@ -17,11 +17,10 @@ from experiments.config.maps import MapFile
 from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
-from experiments.setups.maps.about_circle import check_clips
+from experiments.setups.maps.about_circle import Place, check_clips
 from experiments.setups.maps.composite import PARTS, composite_parts
 from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
 from experiments.setups.maps.map_file import lifted_parts
-from experiments.setups.maps.place import Place
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.pace import check_reach

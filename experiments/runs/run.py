@@ -32,9 +32,8 @@ from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.summary import RunSummary
 from experiments.results.measures.summary_parts import SpeedSummary
-from experiments.setups.default_animation import default_poses
 from experiments.setups.parts.part_types import Measuring
-from experiments.setups.session import Session
+from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from sim.loop.channels import groups, record_into, shown_configuration
@@ -88,7 +87,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
-        from experiments.results.pages.report_of import write_report_of  # matplotlib and viser: after the first tick
+        from experiments.results.pages.report import write_report_of  # matplotlib and viser: after the first tick
 
         write_report_of(out)
     others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())

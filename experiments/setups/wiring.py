@@ -32,8 +32,14 @@ from sim.devices.simulated import simulated_phantom
 from sim.loop.run_units import run_units
 from sim.loop.servo import Servo, unlinked_field
 from sim.reference.floor_lowering import lower_start, lower_start_unit
-from sim.reference.map_derivative import derivative_unit, map_derivative
-from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along
+from sim.reference.reference import (
+    along_unit,
+    begin_in_motion,
+    check_reference,
+    derivative_unit,
+    map_derivative,
+    poses_along,
+)
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.world import World

@@ -1,15 +1,56 @@
 """The search of a tuning: candidates are proposed, certified and only then tried on the panel; each step is stored."""
 
+import json
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import optuna
+from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from experiments.certify.cached_stability import Stability, cached_stability
+from experiments.trials.design.study_config import StudyError
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.tune_config import TuneConfig
+
+
+def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
+    """Optuna's storage in a file or at a URL.
+
+    Parameters
+    ----------
+    where : str or Path
+        File of a journal, or a URL such as ``sqlite:///tune.db`` or ``postgresql://user@host/base``.
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be written or is something else, or the database cannot be reached.
+    """
+    if "://" not in str(where):
+        try:
+            with open(where, "a+b") as file:
+                file.seek(0)
+                first_line = file.readline()
+            if first_line and "op_code" not in json.loads(first_line):  # Optuna takes any single line for unfinished
+                raise ValueError
+            return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
+        except OSError as error:
+            raise StudyError(f"{where}: {error.strerror}; expected a file that can be written") from None
+        except (ValueError, TypeError, KeyError):
+            raise StudyError(
+                f"{where}: is no journal of a search, and is left as it is; expected a new file, or that of a search"
+            ) from None
+    try:
+        return optuna.storages.RDBStorage(str(where))
+    except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer
+        message = str(error).strip().splitlines()[0]
+        raise StudyError(
+            f"{where}: no storage for a search ({message}); expected a URL of SQLAlchemy such as sqlite:///tune.db"
+        ) from None
+
 
 MAX_PROPOSALS_RATIO = (
     30  # maximum of proposals per simulated candidate; if more are needed, hardly any point is certified
@@ -76,7 +117,7 @@ def search(
     config : TuneConfig
         The tuning.
     storage : optuna.storages.BaseStorage
-        Storage of the search; see `experiments.tuning.storage`.
+        Storage of the search; see `storage_of`.
     identity : str
         Hash of the tuning, its name in the storage.
     panel : Panel

@@ -199,7 +199,7 @@ def _study_name(
 def _create_study(search: Search, name: str) -> Any:
     import optuna
 
-    from experiments.tuning.storage import storage_of
+    from experiments.tuning.search import storage_of
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     storage = None if search.journal is None else storage_of(search.journal)

@@ -21,11 +21,9 @@ from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import MAP_CACHE
 from experiments.tuning.contenders import Contender, contenders, interval, signed_gains
-from experiments.tuning.page import tuning_page
+from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
-from experiments.tuning.plots import gains_figure, objectives_figure
-from experiments.tuning.search import Candidate, best_candidate, search
-from experiments.tuning.storage import storage_of
+from experiments.tuning.search import Candidate, best_candidate, search, storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"

@@ -15,7 +15,7 @@ from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
-from experiments.setups.default_animation import default_poses
+from experiments.setups.session import default_poses
 from sim.errors import SimError
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import peak_memory_mb

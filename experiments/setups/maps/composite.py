@@ -10,8 +10,7 @@ from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs
 from experiments.fitting.similarity import arms, carries_alike, upper_joints
-from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
-from experiments.setups.maps.place import Place, place_of
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, place_of
 from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip

@@ -16,8 +16,7 @@ from experiments.fitting.blendable import not_blendable
 from experiments.fitting.push_trials import followed_map
 from experiments.fitting.similarity import arms
 from experiments.fitting.transition_places import carried_over
-from experiments.setups.maps.about_circle import about_circle
-from experiments.setups.maps.place import place_of
+from experiments.setups.maps.about_circle import about_circle, place_of
 from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,

@@ -225,7 +225,7 @@ class Measuring(NamedTuple):
     recording : Recording
         Recording of the run.
     default_poses : callable
-        Makes a function for the animation of the unedited curve (`default_animation.default_poses`).
+        Makes a function for the animation of the unedited curve (`session.default_poses`).
     handled : tuple of (float, float)
         Intervals of time [s] in which the hand does something other than push.
     memory, walkers : Array

@@ -16,8 +16,7 @@ from experiments.config.run_config import PERSON_INTENTS, RunConfig
 from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
 from experiments.results.measures.run_measures import SETTLING
 from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
-from experiments.setups.default_animation import default_poses
-from experiments.setups.session import Session
+from experiments.setups.session import Session, default_poses
 from experiments.trials.trial.trial_log import TrialLog
 from sim.body.falls import UP
 from sim.body.residual import MIN_GROUND_FORCE
