@@ -21,7 +21,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, HandState, IntArray, stylus_path
 from experiments.bench.field_cost import heaviest_field, tick_microseconds
-from experiments.bench.figures import BenchmarkResult, print_figures
+from experiments.bench.figures import BenchmarkResult
 from experiments.bench.page_cost import picture_microseconds
 from experiments.bench.prepare_cost import prepare_cost
 from experiments.bench.recorder_cost import recorder_cost
@@ -48,11 +48,6 @@ from sim.loop.servo import run_block
 ROUNDS = 7  # of which the fastest counts
 _LIBRARY_IMPORTS = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
-
-
-def bench(as_json: bool, check: bool) -> int:
-    """Measure and print all figures; see `experiments.bench.figures.print_figures` for the arguments and the result."""
-    return print_figures(figures(), as_json, check)
 
 
 def figures() -> Iterator[BenchmarkResult]:
@@ -257,11 +252,10 @@ def _evaluate_walls(maps: Maps, field: Compiled, memory: Array, hands: Array, wr
 
 def walls_microseconds(session: Session) -> float:
     """Mean time of a tick of the figure's soft walls for a hand on the default curve [µs]."""
-    curve, numbers = session.curve, JointWalls()
+    curve = session.curve
     times = np.linspace(0.0, curve.duration, 4000)
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
-    walls = figure_walls(session.haptic_map, numbers.wall_stiffness, numbers.wall_margin, numbers.joint_speed)
-    program, wrench = walls.program(), np.empty(6)
+    program, wrench = figure_walls(session.haptic_map, JointWalls()).program(), np.empty(6)
     memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.map_feeds)
     maps = maps._replace(stages=linked_stages(maps.stages))
     _evaluate_walls(maps, field, memory, hands[:2], wrench)

@@ -3,7 +3,6 @@
 import json
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import FROM_WORST, Outcome, hash_of, without_laws
@@ -56,7 +55,9 @@ def cached_stability(config: RunConfig) -> Stability:
         return Stability(**json.loads(file.read_text(encoding="utf-8")))
     found = _certify_stability(config, hands)
     with suppress(OSError):
-        _write_whole(file, json.dumps(asdict(found)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(file) as draft:
+            draft.write(json.dumps(asdict(found)).encode())
     return found
 
 
@@ -74,9 +75,3 @@ def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
     worst = min(verdicts, key=lambda verdict: FROM_WORST.index(verdict.verdict))
     margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)
-
-
-def _write_whole(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(path) as file:
-        file.write(text.encode())

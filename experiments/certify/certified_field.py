@@ -51,11 +51,7 @@ def given_curves(config: RunConfig) -> dict[str, Trajectory]:
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach a lifted one, or there is no such map.
     """
-    return MAP_CURVES[config.map.kind](config, config.map, _unchanged)
-
-
-def _unchanged(curve: Trajectory) -> Trajectory:
-    return curve
+    return MAP_CURVES[config.map.kind](config, config.map, lambda curve: curve)
 
 
 def _lead_curve(config: RunConfig, part: Led, retime: _Retiming) -> dict[str, Trajectory]:

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -94,7 +93,10 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         clock = ServoClock(late=options.late, realtime=options.realtime)
         run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
         ready = run.start()
-        _write_inputs(config, content, options.out)
+        # Only once the servo ticks, since a program that is killed earlier would leave them behind.
+        (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+        if content:
+            save_device(content, options.out / DEVICE)
         for line in (*check_device(ready.identity, make.calibration, "inertia" in content), *ready.said):
             console.print(line, highlight=False)
         if options.view:
@@ -114,13 +116,6 @@ def _compile_session(config: RunConfig, options: RunHardware, console: Console) 
     for remark in session.remarks:
         console.print(remark, highlight=False)
     return session
-
-
-def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None:
-    """Write configuration and device file; only once the servo ticks, since a killed program would leave them."""
-    (out / CONFIG).write_text(to_json(config), encoding="utf-8")
-    if content:
-        save_device(content, out / DEVICE)
 
 
 @contextlib.contextmanager

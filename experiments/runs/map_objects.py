@@ -95,7 +95,7 @@ class Cylindrical(_AboutCurve):
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.body, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
+        return for_size_of(world.body, lambda model: cylindrical_parts(tuple(self.clips), model, self._place()))
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,7 +119,7 @@ class Composite(_AboutCurve):
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.body, lambda model: composite_parts(tuple(self.clips), self._place(), model))
+        return for_size_of(world.body, lambda model: composite_parts(tuple(self.clips), model, self._place()))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from controllers.fields.bunny import felt_bunny
 from experiments.config.maps import Led, MapFile
-from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
+from experiments.config.modes import Bunny, Follow, Rivers, Stretch, StretchThenFollow
 from experiments.config.run_config import RunConfig
 from experiments.setups.parts.defaults import resolved, river_gains, tube_gains
 
@@ -89,10 +89,6 @@ def _bunny_laws(mode: Bunny) -> Laws:
     return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _UNBOUNDED if along else width)}
 
 
-def _river_laws(mode: Rivers) -> Laws:
-    return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
-
-
 def _stretch_laws(mode: Stretch | StretchThenFollow) -> Laws:
     """Tubes seek with the switch open, and hold with it closed."""
     seek, damping = tube_gains(mode)
@@ -102,16 +98,12 @@ def _stretch_laws(mode: Stretch | StretchThenFollow) -> Laws:
     }
 
 
-def _stretch_then_follow_laws(mode: StretchThenFollow) -> Laws:
-    """As `_stretch_laws`, and FOLLOW on the curve as it was before bending."""
-    return _stretch_laws(mode) | {"_then": _follow_laws(mode)[""]}
-
-
-def _lead_laws(mode: Lead) -> Laws:
-    return {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)}
-
-
 _LAWS_BY_MODE: dict[str, Callable[..., Laws]] = {
-    "follow": _follow_laws, "bunny": _bunny_laws, "rivers": _river_laws, "stretch": _stretch_laws,
-    "stretch-then-follow": _stretch_then_follow_laws, "lead": _lead_laws,
-}  # fmt: skip
+    "follow": _follow_laws,
+    "bunny": _bunny_laws,
+    "rivers": lambda mode: {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)},
+    "stretch": _stretch_laws,
+    # FOLLOW is that on the curve as it was before bending.
+    "stretch-then-follow": lambda mode: _stretch_laws(mode) | {"_then": _follow_laws(mode)[""]},
+    "lead": lambda mode: {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)},
+}

@@ -9,13 +9,14 @@ import mujoco
 from experiments.config.maps import Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
 from experiments.fitting.blendable import longest_flight
-from experiments.setups.maps.composite import composite_setup
-from experiments.setups.maps.cylindrical import cylindrical_setup
+from experiments.setups.maps.about_circle import place_of
+from experiments.setups.maps.composite import composite_parts
+from experiments.setups.maps.cylindrical import cylindrical_parts
 from experiments.setups.maps.map_file import map_file_setup
 from experiments.setups.maps.river_clips import river_clips_setup
 from experiments.setups.maps.robot_arm import robot_arm_parts
 from experiments.setups.modes.bunny import bunny_parts
-from experiments.setups.modes.follow import follow_parts
+from experiments.setups.modes.follow import flows_parallel, follow_parts
 from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
@@ -36,8 +37,8 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
 MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
-    "cylindrical": cylindrical_setup,
-    "composite": composite_setup,
+    "cylindrical": lambda config, part, *made_of: cylindrical_parts(*made_of, place_of(part), flows_parallel(config)),
+    "composite": lambda config, part, *made_of: composite_parts(*made_of, place_of(part), flows_parallel(config)),
     "rivers": river_clips_setup,
     "file": map_file_setup,
 }

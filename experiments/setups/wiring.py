@@ -96,7 +96,7 @@ def wire_parts(
     maps: MapParts[Any],
     parts_of: Callable[[Any], Parts],
     ready: Ready,
-    device: DeviceOf | None = None,
+    device: DeviceOf | None,
 ) -> Session:
     """Wire a run from a world and the map's parts.
 

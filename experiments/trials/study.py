@@ -3,7 +3,7 @@
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +59,8 @@ class StudyResult:
 
     def to_json(self) -> str:
         """Sentences, counts, contrasts and interactions as JSON."""
-        contrasts = [asdict(contrast) for contrast in self.found.contrasts]
         summary = {"sentences": self.sentences, "trials": len(self.table), "ran": self.ran, "failed": self.failed}
-        return json_text(summary | {"contrasts": contrasts, "interactions": self.found.interactions})
+        return json_text(summary | {"contrasts": self.found.contrasts, "interactions": self.found.interactions})
 
 
 @dataclass(frozen=True)
@@ -216,7 +215,8 @@ class Study:
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
-        return {trial.meeting.number: cached_stability(trial.config).used for trial in _one_per_condition(trials)}
+        one_each = {trial.meeting.number: trial.config for trial in trials}
+        return {number: cached_stability(config).used for number, config in one_each.items()}
 
 
 def _check_folder(folder: Path) -> None:
@@ -225,11 +225,6 @@ def _check_folder(folder: Path) -> None:
     existing = [] if (folder / DATABASE).exists() else [name for name in names if (folder / name).exists()]
     if existing:
         raise StudyError(f"{folder}: holds {', '.join(existing)}, not of a study; choose another --out")
-
-
-def _one_per_condition(trials: Sequence[Trial]) -> list[Trial]:
-    """One trial of each condition."""
-    return list({trial.meeting.number: trial for trial in trials}.values())
 
 
 def _descriptions(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:

@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import optuna
+from optuna.distributions import FloatDistribution
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
+from controllers.state import Array
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.trials.design.study_config import StudyError
 from experiments.tuning.panel import Panel, panel_runs
@@ -52,9 +54,8 @@ def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
         ) from None
 
 
-MAX_PROPOSALS_RATIO = (
-    30  # maximum of proposals per simulated candidate; if more are needed, hardly any point is certified
-)
+# maximum of proposals per simulated candidate; if more are needed, hardly any point is certified
+MAX_PROPOSALS_RATIO = 30
 RANDOM_STARTUP_COUNT = 10  # candidates drawn at random before a sampler begins to learn from results
 
 
@@ -73,6 +74,11 @@ def sampler_of(name: str, seed: int, number: int) -> optuna.samplers.BaseSampler
         "random": lambda: optuna.samplers.RandomSampler(seed=candidate_seed),
     }
     return makers[name]()
+
+
+def distributions_of(config: TuneConfig) -> dict[str, optuna.distributions.BaseDistribution]:
+    """Optuna's distributions of the tuned parameters."""
+    return {word: FloatDistribution(span.low, span.high, log=span.log) for word, span in config.space.items()}
 
 
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -132,24 +138,17 @@ def search(
         storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=RANDOM_STARTUP_COUNT, n_warmup_steps=1),
     )  # fmt: skip
-    space: dict[str, optuna.distributions.BaseDistribution] = {
-        word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
-        for word, span in config.space.items()
-    }
+    space = distributions_of(config)
     for interrupted in study.get_trials(states=(TrialState.RUNNING,)):
         study.tell(interrupted.number, state=TrialState.FAIL)  # it is proposed again
     while True:
-        simulated, proposed = _count_simulated(study), len(study.get_trials(deepcopy=False, states=_FINISHED))
+        proposed = candidates_of(study)
+        simulated = sum(candidate.state != "refused" for candidate in proposed)
         progress(simulated)
-        if simulated >= config.candidates or proposed >= MAX_PROPOSALS_RATIO * config.candidates:
-            return candidates_of(study)
-        study.sampler = sampler_of(sampler, config.seed, proposed)
+        if simulated >= config.candidates or len(proposed) >= MAX_PROPOSALS_RATIO * config.candidates:
+            return proposed
+        study.sampler = sampler_of(sampler, config.seed, len(proposed))
         _try_candidate(config, study, study.ask(space), panel)
-
-
-def _count_simulated(study: optuna.Study) -> int:
-    trials = study.get_trials(deepcopy=False, states=_FINISHED)
-    return sum(t.state.is_finished() and t.user_attrs.get("violation", 1.0) <= 0.0 for t in trials)
 
 
 def _try_candidate(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
@@ -206,10 +205,15 @@ def candidates_of(study: optuna.Study) -> list[Candidate]:
     return candidates
 
 
+def signs_of(directions: Sequence[str]) -> Array:
+    """1 for each objective to be minimised, −1 for each to be maximised: its factor as a cost."""
+    return np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+
+
 def pareto_front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
     """The Pareto front: candidates that no other one dominates."""
     tried = [candidate for candidate in candidates if candidate.objectives is not None]
-    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    signs = signs_of(directions)
     costs = np.array([signs * np.array(c.objectives) for c in tried]).reshape(len(tried), len(signs))
     return [
         c for c, cost in zip(tried, costs, strict=True)
@@ -225,7 +229,7 @@ def best_candidate(candidates: Sequence[Candidate], directions: Sequence[str]) -
     best = pareto_front(candidates, directions)
     if not best:
         return None
-    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    signs = signs_of(directions)
     costs = np.array([signs * np.array(c.objectives) for c in best])
     low, span = costs.min(axis=0), np.ptp(costs, axis=0)
     scaled = (costs - low) / np.where(span > 0.0, span, 1.0)

@@ -4,11 +4,9 @@ from typing import Any
 
 import viser
 
-from controllers.errors import ParameterError
 from experiments.config.maps import MAPS, Led, MapFile, RobotArm
 from experiments.config.modes import MODES
 from experiments.config.options import run_config
-from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.live.panels import Acts
 from experiments.live.session.desk import Desk
@@ -138,16 +136,3 @@ def _default_clips(kind: str) -> tuple[str, ...]:
 def _clip_label(clip: str) -> str:
     """Name of a clip in a list; for a file, its stem."""
     return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
-
-
-def configuration_text(config: RunConfig | None) -> str:
-    """A configuration as JSON, for ``hvf run --config``.
-
-    Raises
-    ------
-    ParameterError
-        If nothing runs yet.
-    """
-    if config is None:
-        raise ParameterError("nothing runs yet; expected a run whose configuration can be kept")
-    return to_json(config)

@@ -11,8 +11,8 @@ import viser
 
 from controllers.errors import ParameterError
 from controllers.state import Array
+from experiments.config.part import to_json
 from experiments.live.panels import Acts
-from experiments.live.panels.run_panel import configuration_text
 from experiments.live.session.desk import Desk
 from experiments.live.session.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
@@ -106,7 +106,9 @@ class TakesPanel:
     def _on_download(self, event: Any) -> None:
         kind = self._download.value
         if kind == "Configuration":
-            _send(event, "config.json", configuration_text(self._desk.config).encode())
+            if self._desk.config is None:
+                raise ParameterError("nothing runs yet; expected a run whose configuration can be kept")
+            _send(event, "config.json", to_json(self._desk.config).encode())
             return
         file = self._take_folder(self._list) / (EDITED if kind == "BVH" else RECORDING)
         _send(event, f"{self._list.value}{file.suffix}", file.read_bytes())

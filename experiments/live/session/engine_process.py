@@ -3,7 +3,7 @@
 import os
 import queue
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,18 +22,13 @@ from experiments.live.session.messages import (
     Build,
     Built,
     GoBack,
+    Order,
     Perform,
     Progress,
-    Quit,
-    Rearm,
     Record,
-    Redo,
     Refused,
-    Reset,
     Saved,
     SetGains,
-    Stop,
-    Undo,
 )
 from experiments.live.session.takes import Take
 from experiments.live.session.workers import PageProcess
@@ -68,7 +63,7 @@ class EngineProcess(PageProcess):
 
     def close(self) -> None:
         """End the process; a take in progress is saved."""
-        self.ask(Quit())
+        self.ask(Order.QUIT)
         self._process.join(30.0)
         if self._process.is_alive():
             self._process.kill()
@@ -93,7 +88,7 @@ class _EngineLoop:
         self._curve_count, self._curve_changed = 0, True
 
     def run(self) -> None:
-        """Run until `Quit`, or until the page's process has ended."""
+        """Run until `Order.QUIT`, or until the page's process has ended."""
         origin, pace = time.perf_counter(), 1.0
         elapsed = 0.0
         while self._is_running and os.getppid() == self._parent:
@@ -148,7 +143,7 @@ class _EngineLoop:
     def _execute(self, order: object) -> None:
         if isinstance(order, Build):
             self._build(order)
-        elif isinstance(order, Quit):
+        elif order is Order.QUIT:
             self._is_running = False
         elif self._engine is not None:
             self._update_drag(self._engine)
@@ -156,24 +151,27 @@ class _EngineLoop:
             self._curve_changed = True
 
     def _execute_on_engine(self, order: object, engine: Engine) -> None:
-        actions: dict[type, Callable[[Any], Any]] = {
-            SetGains: lambda order: engine.set_gains(order.config),
-            Reset: lambda order: engine.reset(),
-            GoBack: lambda order: engine.back_to(order.t),
-            Undo: lambda order: engine.undo(),
-            Redo: lambda order: engine.redo(),
-            Perform: lambda order: engine.perform(order.now),
-            Rearm: lambda order: engine.rearm(),
-            Record: lambda order: self._record(order, engine),
-            Stop: lambda order: self._stop(engine),
-        }
-        if isinstance(order, Reset | GoBack):
+        if order in (Order.RESET, Order.STOP) or isinstance(order, GoBack | Record):
             self._stop(engine)  # a take must be continuous in time
-        actions[type(order)](order)
-
-    def _record(self, order: Record, engine: Engine) -> None:
-        self._stop(engine)
-        self._take = Take(order.folder, engine)
+        match order:
+            case SetGains(config):
+                engine.set_gains(config)
+            case GoBack(t):
+                engine.back_to(t)
+            case Perform(now):
+                engine.perform(now)
+            case Record(folder):
+                self._take = Take(folder, engine)
+            case Order.RESET:
+                engine.reset()
+            case Order.UNDO:
+                engine.undo()
+            case Order.REDO:
+                engine.redo()
+            case Order.REARM:
+                engine.rearm()
+            case _:
+                pass
 
     def _stop(self, engine: Engine) -> None:
         if self._take is None:

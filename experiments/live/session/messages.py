@@ -1,6 +1,7 @@
 """Messages between the page and the engine's process; values that change continuously are on shared boards."""
 
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,17 @@ HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1
 """Rows of the page's board, with their sizes: grip, target and clock; ``steps`` counts the requested single steps."""
 
 
+class Order(Enum):
+    """Orders without content."""
+
+    RESET = "return to the beginning"
+    UNDO = "undo the last bend"
+    REDO = "redo the last undone bend"
+    REARM = "clear a latched fault"
+    STOP = "end the take"
+    QUIT = "end the process"
+
+
 @dataclass(frozen=True)
 class Build:
     """Build another run."""
@@ -37,25 +49,10 @@ class SetGains:
 
 
 @dataclass(frozen=True)
-class Reset:
-    """Return to the beginning."""
-
-
-@dataclass(frozen=True)
 class GoBack:
     """Go back to the last stored state at or before a time [s]."""
 
     t: float
-
-
-@dataclass(frozen=True)
-class Undo:
-    """Undo the last bend."""
-
-
-@dataclass(frozen=True)
-class Redo:
-    """Redo the last undone bend."""
 
 
 @dataclass(frozen=True)
@@ -66,25 +63,10 @@ class Perform:
 
 
 @dataclass(frozen=True)
-class Rearm:
-    """Clear a latched fault."""
-
-
-@dataclass(frozen=True)
 class Record:
     """Begin a take in a folder."""
 
     folder: Path
-
-
-@dataclass(frozen=True)
-class Stop:
-    """End the take."""
-
-
-@dataclass(frozen=True)
-class Quit:
-    """End the process."""
 
 
 @dataclass(frozen=True)

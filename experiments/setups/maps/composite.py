@@ -5,28 +5,18 @@ from dataclasses import replace
 import mujoco
 
 from controllers.haptic_map.composite import Composite as CompositeMap
-from experiments.config.maps import Composite
-from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs
 from experiments.fitting.similarity import arms, carries_alike, upper_joints
-from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, place_of
-from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
 PARTS = 3  # number of clips
 
 
-def composite_setup(
-    config: RunConfig, part: Composite, clips: tuple[Clip, ...], figure: mujoco.MjModel
-) -> ClipMapParts:
-    """Map parts of a configured composite map; see `composite_parts`."""
-    return composite_parts(clips, place_of(part), figure, flows_parallel(config))
-
-
 def composite_parts(
-    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
 ) -> ClipMapParts:
     """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
 

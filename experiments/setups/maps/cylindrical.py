@@ -10,16 +10,13 @@ from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
 from controllers.haptic_map.cylindrical import correction_shape
 from controllers.legs.limbs import Limb
 from controllers.state import Array
-from experiments.config.maps import Cylindrical
-from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
 from experiments.fitting.blendable import keep_own_pace, same, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, moves_alike
-from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, place_of
-from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.compilation.sources import results_folder
@@ -27,15 +24,8 @@ from sim.compilation.sources import results_folder
 CORNERS = 4  # number of clips
 
 
-def cylindrical_setup(
-    config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel
-) -> ClipMapParts:
-    """Map parts of a configured cylindrical map; see `cylindrical_parts`."""
-    return cylindrical_parts(clips, place_of(part), figure, flows_parallel(config))
-
-
 def cylindrical_parts(
-    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
 ) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
 

@@ -18,10 +18,9 @@ from controllers.state import stylus_path
 from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.results.measures.run_measures import trace_summary
-from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import tank_for
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
-from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
 
@@ -84,20 +83,15 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handling_spans(user),
         remarks=turning_remark(user, maps.oriented) + late_remark(user, config.seconds),
-        summarise=_add_trace if traces else lambda summary, of: summary,
+        summarise=lambda summary, of: replace(summary, trace=trace_summary(of.recording)) if traces else summary,
     )  # fmt: skip
-
-
-def _add_trace(summary: RunSummary, of: Measuring) -> RunSummary:
-    return replace(summary, trace=trace_summary(of.recording))
 
 
 def with_walls(program: Program, walls: JointWalls | None, maps: ClipMapParts) -> Program:
     """A field, plus the soft walls of the figure's joints if the run has them."""
     if walls is None:
         return program
-    made = figure_walls(maps.whole_map, walls.wall_stiffness, walls.wall_margin, walls.joint_speed)
-    return program + made.program()
+    return program + figure_walls(maps.whole_map, walls).program()
 
 
 def with_moment(program: Program, moment: OrientationMoment | None, course: Trajectory, tube: float) -> Program:
@@ -117,14 +111,15 @@ def with_moment(program: Program, moment: OrientationMoment | None, course: Traj
 DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
 
 
-def figure_walls(haptic_map: HapticMap, stiffness: float, margin: float, speed: float) -> SoftWall:
-    """A field that repels the hand from the limits of the figure's joints and from joint speeds above `speed` [rad/s].
+def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
+    """A field that repels the hand from the limits of the figure's joints and of their speeds.
 
     Raises
     ------
     ParameterError
         If a number is out of its interval.
     """
+    margin, speed = walls.wall_margin, walls.joint_speed
     n, narrowest = len(JOINTS), float(np.diff(joint_range(), axis=2).min())
     if margin > 0.5 * narrowest:
         raise ParameterError(
@@ -132,4 +127,6 @@ def figure_walls(haptic_map: HapticMap, stiffness: float, margin: float, speed: 
             "narrowest range"
         )
     columns, rows = range(N_POSE - 4 * n, N_POSE, 4), range(N_TANGENT - 3 * n, N_TANGENT, 3)
-    return SoftWall(haptic_map, tuple(columns), tuple(rows), tuple(joint_range()), stiffness, margin, DAMPING, speed)
+    return SoftWall(
+        haptic_map, tuple(columns), tuple(rows), tuple(joint_range()), walls.wall_stiffness, margin, DAMPING, speed
+    )

@@ -3,7 +3,7 @@
 import html
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -42,66 +42,32 @@ users. Grey: no difference is shown. {interactions}</p>
 """
 
 
-@dataclass(frozen=True)
-class Report:
-    """Content of the page of a study.
-
-    Attributes
-    ----------
-    study : StudyConfig
-        The study.
-    text : str
-        Text of its file.
-    sentences : sequence of str
-        Main results, for a skimming reader.
-    found : Statistics
-        All contrasts.
-    plots : mapping of str to Figure
-        Plots by caption.
-    effects : Figure or None
-        Effect sizes of all measures.
-    failures : mapping of str to int
-        Number of failed trials, by reason.
-    replays : sequence of Replay
-        Replays of single trials.
-    made : str
-        Code, libraries and processors that the study was made with.
-    """
-
-    study: StudyConfig
-    text: str
-    sentences: Sequence[str]
-    found: Statistics
-    plots: Mapping[str, Figure]
-    effects: Figure | None
-    failures: Mapping[str, int]
-    replays: Sequence[Replay]
-    made: str
-
-    def page(self) -> str:
-        """HTML of the page."""
-        names = list(dict.fromkeys(contrast.measure for contrast in self.found.contrasts))
-        body = _BODY.format(
-            question=html.escape(self.study.question),
-            sentences=sentences(self.sentences),
-            plots="".join(
-                f"<p class='note'>{html.escape(what)}</p>{image(plot, what)}" for what, plot in self.plots.items()
-            ),
-            table=_table(self.found.contrasts),
-            tests=sum(math.isfinite(contrast.p) for contrast in self.found.contrasts),
-            interactions=_interactions(self.found),
-            remarks="".join(f"<p class='note'>{html.escape(remark)}.</p>" for remark in self.found.remarks),
-            effects="" if self.effects is None else f"<h2>Size of the effects</h2>{image(self.effects, 'effects')}",
-            measures="".join(_measure_row(name) for name in names),
-            failures=_failures(self.failures),
-            replays="".join(
-                f'<h2>{html.escape(r.title)}</h2><iframe title="Replay" srcdoc="{html.escape(r.page)}"></iframe>'
-                for r in self.replays
-            ),
-            study=html.escape(self.text),
-            made=html.escape(self.made),
-        )
-        return html_page(self.study.name, body, NUMBERS)
+def _page(
+    study: StudyConfig, text: str, said: Sequence[str], found: Statistics, plots: Mapping[str, Figure],
+    failures: Mapping[str, int], shown: Sequence[Replay], made: str,
+) -> str:  # fmt: skip
+    """HTML of the page; the arguments are those of `write_report`, and plots by caption, failures by reason."""
+    names = list(dict.fromkeys(contrast.measure for contrast in found.contrasts))
+    effects = effects_figure(found, next(iter(study.factors)))
+    body = _BODY.format(
+        question=html.escape(study.question),
+        sentences=sentences(said),
+        plots="".join(f"<p class='note'>{html.escape(what)}</p>{image(plot, what)}" for what, plot in plots.items()),
+        table=_table(found.contrasts),
+        tests=sum(math.isfinite(contrast.p) for contrast in found.contrasts),
+        interactions=_interactions(found),
+        remarks="".join(f"<p class='note'>{html.escape(remark)}.</p>" for remark in found.remarks),
+        effects="" if effects is None else f"<h2>Size of the effects</h2>{image(effects, 'effects')}",
+        measures="".join(_measure_row(name) for name in names),
+        failures=_failures(failures),
+        replays="".join(
+            f'<h2>{html.escape(r.title)}</h2><iframe title="Replay" srcdoc="{html.escape(r.page)}"></iframe>'
+            for r in shown
+        ),
+        study=html.escape(text),
+        made=html.escape(made),
+    )
+    return html_page(study.name, body, NUMBERS)
 
 
 def _table(contrasts: Sequence[Contrast]) -> str:
@@ -184,7 +150,7 @@ def write_report(
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()
-    sentences = three_sentences(study, found, frame, int(failures.sum()))
+    said = three_sentences(study, found, frame, int(failures.sum()))
     factor, *rest = factors
     plots = {
         MEASURES[measure].says: levels_figure(frame, factor, factors[factor], rest, measure)
@@ -193,9 +159,8 @@ def write_report(
     replay_measure = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
     shown = replays(tuple(trials), frame, replay_measure) if replay_measure else ()
     counts = {str(reason): int(count) for reason, count in failures.items()}
-    page = Report(study, text, sentences, found, plots, effects_figure(found, factor), counts, shown, made).page()
-    path.write_text(page, encoding="utf-8")
+    path.write_text(_page(study, text, said, found, plots, counts, shown, made), encoding="utf-8")
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
     pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)
-    return found, sentences
+    return found, said

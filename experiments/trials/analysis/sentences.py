@@ -24,10 +24,11 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
+    times = {1: "once", 2: "twice"}.get(study.repetitions, f"{study.repetitions} times")
     outcome = "all of which came to their end" if not failed else f"of which {failed} failed"
     first = (
         f"{_people(study.users.number)} met {counts} conditions ({', '.join(study.factors)}), "
-        f"{_times(study.repetitions)} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
+        f"{times} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
     )
     ease, cost = (
         _answer(found.of(measure, factor), measure, factor, _missing_reason(frame, measure))
@@ -80,7 +81,3 @@ def _format_number(value: float) -> str:
 
 def _people(count: int) -> str:
     return "One simulated person" if count == 1 else f"{count} simulated people"
-
-
-def _times(count: int) -> str:
-    return {1: "once", 2: "twice"}.get(count, f"{count} times")
