@@ -6,8 +6,8 @@ from functools import partial
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
-from sim.compilation.workers import compile_units, missing_units
 
 
 def compiler(console: Console) -> Callable[[Sequence[Unit]], None]:

@@ -12,7 +12,7 @@ from experiments.files.array_cache import cached_array
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
 from sim.compilation.sources import results_folder
-from sim.compilation.workers import compile_units
+from sim.compilation.unit_workers import compile_units
 
 MAX_RESIDUAL = RESIDUAL_IN_FLIGHTS
 """Largest acceptable RMS of the residual force [body weights]."""

@@ -35,8 +35,8 @@ from experiments.live.session.workers import PageProcess
 from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from models.errors import ModelError
+from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
-from sim.compilation.workers import compile_units, missing_units
 from sim.errors import SimError
 from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration

@@ -13,8 +13,8 @@ from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.setups.wiring import wire
 from sim.compilation import workers
+from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit, unit_function
-from sim.compilation.workers import compile_units, missing_units
 from sim.errors import SimError
 
 TOYS = Path(__file__).parents[2] / "sim" / "compilation"
