@@ -42,9 +42,8 @@ from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 
-MIN_FRAME_INTERVAL = (
-    0.012  # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
-)
+# [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
+MIN_FRAME_INTERVAL = 0.012
 SLICE_INTERVAL = 0.25  # [s] between two computations of the field slice
 SLICE_WIDTH = 0.14  # [m] side of the slice
 IDLE_POLL_INTERVAL = 0.01  # [s] between two polls of the page while nothing runs

@@ -30,12 +30,10 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-PUSH_START_DISTANCE = (
-    3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
-)
-MIN_PUSHED_RIVER_SPEED = (
-    0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
-)
+# [m] distance from its place within which a push into another river begins: a fifth of a tube
+PUSH_START_DISTANCE = 3e-3
+# [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
+MIN_PUSHED_RIVER_SPEED = 0.0235
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 TRACE_SAMPLE_TIME = 0.01  # [s] between samples of a path that the hand traces
 
