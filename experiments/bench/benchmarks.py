@@ -20,11 +20,9 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import Array, HandState, IntArray, stylus_path
-from experiments.bench.field_cost import heaviest_field, tick_microseconds
 from experiments.bench.figures import BenchmarkResult
-from experiments.bench.page_cost import picture_microseconds
+from experiments.bench.part_costs import heaviest_field, picture_microseconds, recorder_cost, tick_microseconds
 from experiments.bench.prepare_cost import prepare_cost
-from experiments.bench.recorder_cost import recorder_cost
 from experiments.bench.tick_cost import MODES, STEP, figure_cost, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE

@@ -12,13 +12,13 @@ from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY, Array
-from experiments.live.session.board import Board
 from experiments.live.session.engine import Drag, Engine
 from experiments.live.session.messages import (
     COURSE_POINTS,
     HELD,
     SHOWN,
     SLICE_SIDE,
+    Board,
     Build,
     Built,
     GoBack,
