@@ -19,11 +19,7 @@ from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
 VERSION = 1
-_KINDS = {
-    "Cylindrical": Cylindrical.from_arrays,
-    "Composite": Composite.from_arrays,
-    "Lifted": Lifted.from_arrays,
-}
+_KINDS = {"Cylindrical": Cylindrical.from_arrays, "Composite": Composite.from_arrays, "Lifted": Lifted.from_arrays}
 
 
 def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:

@@ -74,13 +74,13 @@ class Silhouettes:
 
     def draw(
         self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
-        paint: Paint = lambda body, rgba: tuple(rgba), zorder: float = 3.0,
+        paint: Paint = lambda body, rgba: tuple(rgba),
     ) -> None:  # fmt: skip
         """Draw a pose with its root above a point of the axes, with `scale` units of the axes per metre."""
         for outline in self.outlines(pose, azimuth):
             color = paint(outline.body, outline.rgba)
             corners = np.asarray(at) + scale * outline.corners
-            ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=zorder))
+            ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=3.0))
 
 
 def _circle() -> Array:

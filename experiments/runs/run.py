@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from rich.console import Console
 
-from controllers.curves.trajectory import Trajectory
 from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
@@ -190,14 +189,16 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
     """Summary of a session that has been run, computed from its recording."""
     parts = session.parts
 
-    def keep_curve(curve: Trajectory) -> None:
-        save_curve(curve, out / CURVE_FILE)
-
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
         field = session.servo.field
         of = Measuring(
-            recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state, keep_curve
+            recording,
+            lambda: default_poses(session),
+            parts.handled,
+            field.memory,
+            field.walkers.state,
+            lambda curve: save_curve(curve, out / CURVE_FILE),
         )
         return parts.summarise(summary, of)
 

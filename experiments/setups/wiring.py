@@ -92,11 +92,7 @@ def wire(
 
 
 def wire_parts(
-    world: World,
-    maps: MapParts[Any],
-    parts_of: Callable[[Any], Parts],
-    ready: Ready,
-    device: DeviceOf | None,
+    world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready, device: DeviceOf | None
 ) -> Session:
     """Wire a run from a world and the map's parts.
 

@@ -24,7 +24,7 @@ from experiments.trials.execution.drive import check_writable, compile_and_make_
 from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
-from experiments.trials.trial.run_trial import MAP_CACHE, Row
+from experiments.trials.trial.run_trial import Row
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -149,7 +149,7 @@ class Study:
         _check_folder(folder)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             self._refuse_fewer(folder, database)
-            compile_and_make_maps((trial.config for trial in trials), MAP_CACHE, console)
+            compile_and_make_maps((trial.config for trial in trials), console)
             with executor(where) as pool:
                 ran = run_missing(trials, database, pool, self.config.recordings, console, _descriptions(trials))
             planned_keys = {trial.key for trial in trials}

@@ -20,7 +20,6 @@ from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps
 from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
-from experiments.trials.trial.run_trial import MAP_CACHE
 from experiments.tuning.contenders import Contender, contenders
 from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
@@ -113,9 +112,7 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
     console, text = Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
-        compile_and_make_maps(
-            panel_runs(config, config.config({}), replace(config.users, number=1))[0], MAP_CACHE, console
-        )
+        compile_and_make_maps(panel_runs(config, config.config({}), replace(config.users, number=1))[0], console)
         with executor(where or Where()) as pool:
             panel, storage = Panel(database, pool), storage_of(config.storage or out / JOURNAL)
             found = _run_search(config, storage, identity, panel, config.sampler, console)

@@ -41,9 +41,7 @@ class RunPanel:
         with gui.add_folder("Run"):
             self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)
             self._map = gui.add_dropdown(
-                "Map",
-                tuple(kind for kind in maps if kind != "file" or self._file),
-                initial_value=_map_kind(config),
+                "Map", tuple(kind for kind in maps if kind != "file" or self._file), initial_value=_map_kind(config)
             )
             self._figure = gui.add_dropdown("Figure", ("physical", "kinematic"), initial_value=config.figure.kind)
             self._folder = gui.add_folder("Clips")

@@ -131,7 +131,10 @@ class TakesPanel:
         self._ghosts = TakeGhosts(self._scene, self._model, {"0": first.path, "1": second.path})
         self._legend.content = _legend((first, second))
         n = max(len(first.force), len(second.force))
-        self._plot.data = (np.arange(n) / FPS, *(_padded(take.force, n) for take in (first, second)))
+        self._plot.data = (
+            np.arange(n) / FPS,
+            *(np.pad(take.force, (0, n - len(take.force)), constant_values=np.nan) for take in (first, second)),
+        )
         self._plot.visible = True
 
     def _on_mix(self) -> None:
@@ -170,10 +173,6 @@ class TakesPanel:
 
 def _send(event: Any, name: str, content: bytes) -> None:
     event.client.send_file_download(name, content, save_immediately=True)
-
-
-def _padded(values: np.ndarray, n: int) -> np.ndarray:
-    return np.concatenate([values, np.full(n - len(values), np.nan)])
 
 
 def _legend(takes: tuple[TakeData, ...]) -> str:

@@ -10,18 +10,7 @@ from experiments.config.run_config import User
 from experiments.setups.parts.expression import lap_turns
 from sim.users.hand.actions import Grab, Push
 from sim.users.hand.arm import Arm
-from sim.users.intents import (
-    Bend,
-    ChangeOver,
-    CutCorner,
-    Exaggerate,
-    GetLost,
-    Own,
-    Press,
-    Relax,
-    Resist,
-    Trace,
-)
+from sim.users.intents import Bend, ChangeOver, CutCorner, Exaggerate, GetLost, Own, Press, Relax, Resist, Trace
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
@@ -203,10 +192,7 @@ def edited_until(grabs: tuple[Grab, ...]) -> float:
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
     """A push outwards and one inwards, of peak `force` [N], in the lap that begins at `start` [s]."""
-    return (
-        Push(start + 0.1 * lap, 0.3 * lap, force),
-        Push(start + 0.6 * lap, 0.3 * lap, -force),
-    )
+    return (Push(start + 0.1 * lap, 0.3 * lap, force), Push(start + 0.6 * lap, 0.3 * lap, -force))
 
 
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:

@@ -24,10 +24,11 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
+    people = "One simulated person" if study.users.number == 1 else f"{study.users.number} simulated people"
     times = {1: "once", 2: "twice"}.get(study.repetitions, f"{study.repetitions} times")
     outcome = "all of which came to their end" if not failed else f"of which {failed} failed"
     first = (
-        f"{_people(study.users.number)} met {counts} conditions ({', '.join(study.factors)}), "
+        f"{people} met {counts} conditions ({', '.join(study.factors)}), "
         f"{times} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
     )
     ease, cost = (
@@ -77,7 +78,3 @@ def _comparison(c: Contrast) -> str:
 
 def _format_number(value: float) -> str:
     return f"{value:.3g}"
-
-
-def _people(count: int) -> str:
-    return "One simulated person" if count == 1 else f"{count} simulated people"

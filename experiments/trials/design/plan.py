@@ -62,15 +62,12 @@ def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
     for meeting in design_trials(study):
         base = bases[meeting.number]
         user = replace(base.user, person=people[meeting.user])
-        config = replace(base, user=user, seed=trial_seed(study.seed, meeting))
+        # Independent of other trials' seeds, and of the numbers of users and repetitions.
+        entropy = (study.seed, meeting.user, meeting.number, meeting.repetition)
+        seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
+        config = replace(base, user=user, seed=seed)
         trials.append(Trial(trial_key(config), meeting, config))
     return tuple(trials)
-
-
-def trial_seed(seed: int, meeting: DesignTrial) -> int:
-    """Seed of a trial, independent of other trials' seeds and of the numbers of users and repetitions."""
-    entropy = (seed, meeting.user, meeting.number, meeting.repetition)
-    return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
 
 
 def trial_key(config: RunConfig) -> str:

@@ -14,7 +14,7 @@ from experiments.console.compiling import compiler
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
-from experiments.trials.trial.run_trial import MapCache, Row, Task
+from experiments.trials.trial.run_trial import MAP_CACHE, Row, Task
 
 
 class Executor(Protocol):
@@ -32,10 +32,10 @@ class _RateColumn(ProgressColumn):
         return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
 
 
-def compile_and_make_maps(configs: Iterable[RunConfig], shelf: MapCache, console: Console) -> None:
+def compile_and_make_maps(configs: Iterable[RunConfig], console: Console) -> None:
     """Compile the units that trials need, once for each kind of run, and make their maps."""
     for config in {_compilation_key(config): config for config in configs}.values():
-        shelf.session(config, compiler(console))
+        MAP_CACHE.session(config, compiler(console))
 
 
 def _compilation_key(config: RunConfig) -> object:

@@ -5,12 +5,10 @@ import platform
 import tempfile
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import mujoco
 from llvmlite.binding import get_host_cpu_name
 
 from experiments.config.maps import Composite, Cylindrical
@@ -22,7 +20,6 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import measure_trial
 from experiments.trials.trial.trial_log import TrialLog
-from models.mocap.motion.clip import Clip
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
@@ -98,10 +95,7 @@ class MapCache:
                     session = wire(config, ready=ready)
                     # The map was already refined when this session was assembled.
                     self._maps[key] = replace(session.parts.maps, refined=None)
-        return wire(config, ready=ready, maps_of=self._map_maker(key))
-
-    def _map_maker(self, key: object) -> Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]:
-        return lambda config, figure, clips: self._maps[key]
+        return wire(config, ready=ready, maps_of=lambda *_: self._maps[key])
 
 
 def _map_key(config: RunConfig) -> object:
