@@ -123,13 +123,9 @@ def _flatten(values: Mapping[str, object]) -> dict[str, object]:
 
 
 def certificate_inputs(
-    config: RunConfig,
-    delay: float,
-    hands: HandRange,
-    push: float,
-    clips: Sequence[Clip] = (),
+    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = (),
     judging: JudgementCriteria = DEFAULT_CRITERIA,
-) -> dict[str, object]:
+) -> dict[str, object]:  # fmt: skip
     """All data on which the verdicts on a run's field depend, by name, for `hash_of`.
 
     Parameters

@@ -78,13 +78,9 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     session = _compile_session(config, options, console)
     job = RecordingJob(options.out / RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
-        served(config),
-        options.name,
-        _gate(config, options),
-        linkage_from(content).offset,
-        calibration_from(content),
+        served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content),
         silent=options.silence,
-    )
+    )  # fmt: skip
     with run_folder(options), contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             make_device = MakeEmulated(scene, start_of(session), emulated_linkage)

@@ -242,17 +242,8 @@ class Page:
         self.pictures += 1
         nq = stage.configuration_size
         with self.server.atomic():
-            stage.show(
-                Moment(
-                    float(now["t"][0]),
-                    now["qpos"][:nq],
-                    now["ghost"],
-                    now["p"],
-                    now["force"],
-                    now["user"],
-                    now["target"],
-                )
-            )
+            shown = (now[name] for name in ("ghost", "p", "force", "user", "target"))
+            stage.show(Moment(float(now["t"][0]), now["qpos"][:nq], *shown))
             if now["curve"][0] != self._drawn_curve and desk.built is not None and desk.built.bends:
                 self._drawn_curve = now["curve"][0]
                 stage.draw_course(0, now["course"].reshape(COURSE_POINTS, 3))

@@ -193,13 +193,9 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
         field = session.servo.field
         of = Measuring(
-            recording,
-            lambda: default_poses(session),
-            parts.handled,
-            field.memory,
-            field.walkers.state,
+            recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state,
             lambda curve: save_curve(curve, out / CURVE_FILE),
-        )
+        )  # fmt: skip
         return parts.summarise(summary, of)
 
 

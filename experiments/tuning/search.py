@@ -109,13 +109,9 @@ class Candidate(NamedTuple):
 
 
 def search(
-    config: TuneConfig,
-    storage: optuna.storages.BaseStorage,
-    identity: str,
-    panel: Panel,
-    sampler: str,
+    config: TuneConfig, storage: optuna.storages.BaseStorage, identity: str, panel: Panel, sampler: str,
     progress: Callable[[int], None],
-) -> list[Candidate]:
+) -> list[Candidate]:  # fmt: skip
     """Search until enough candidates have been simulated, continuing from the candidates in the storage.
 
     Parameters

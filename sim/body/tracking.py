@@ -220,13 +220,9 @@ def tracked_motion(
     _simulate(drive.address(), *arguments)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
-        reference,
-        *log,
-        figure.state.weight,
-        standing_com(config.stature, config.mass),
-        warnings,
+        reference, *log, figure.state.weight, standing_com(config.stature, config.mass), warnings,
         math.inf if clip.closes(CLOSURE_TOLERANCE) else clip.duration,
-    )
+    )  # fmt: skip
 
 
 def track(
@@ -259,20 +255,14 @@ def report(motion: TrackedMotion) -> TrackingReport:
 
     on_ground = up & ~in_flight
     return TrackingReport(
-        seconds=period * len(times),
-        flight_seconds=period * float(np.sum(in_flight)),
-        falls=tuple(falls.tolist()),
-        up_seconds=period * float(np.sum(up)),
-        joint_error=float(np.rad2deg(_rms(angles))),
-        root_error=_rms(root),
+        seconds=period * len(times), flight_seconds=period * float(np.sum(in_flight)), falls=tuple(falls.tolist()),
+        up_seconds=period * float(np.sum(up)), joint_error=float(np.rad2deg(_rms(angles))), root_error=_rms(root),
         root_error_max=float(root.max(initial=0.0)),
-        residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),
-        stance=residual(~in_flight),
+        residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)), stance=residual(~in_flight),
         without_ground_force=residual(~is_supported),
         grounded=float(np.mean(is_supported[on_ground])) if on_ground.any() else 1.0,
-        slide=_largest_slide(motion.contacts, touches),
-        warnings=motion.warnings,
-    )
+        slide=_largest_slide(motion.contacts, touches), warnings=motion.warnings,
+    )  # fmt: skip
 
 
 def _rms(values: Array) -> float:

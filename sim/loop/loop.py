@@ -111,16 +111,11 @@ class Loop:
     """
 
     def __init__(
-        self,
-        servo: Servo,
-        world: World,
-        observe: Observer = lambda ticks, frames, n: None,
-        block_seconds: float = BLOCK_SECONDS,
-        python_laws: Sequence[Callable[[HandState], Array]] = (),
-        before_tick: Callable[[int], None] | None = None,
-        ask: Callable[[float], None] | None = None,
+        self, servo: Servo, world: World, observe: Observer = lambda ticks, frames, n: None,
+        block_seconds: float = BLOCK_SECONDS, python_laws: Sequence[Callable[[HandState], Array]] = (),
+        before_tick: Callable[[int], None] | None = None, ask: Callable[[float], None] | None = None,
         ask_seconds: float = BLOCK_SECONDS,
-    ):
+    ):  # fmt: skip
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
         self._block_ticks = every * max(1, round(block_seconds / servo.plant.period / every))

@@ -135,14 +135,9 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
 
 
 def make_reference(
-    figure_model: mujoco.MjModel,
-    compiled: CompiledMap,
-    period: float,
-    bandwidth: float,
-    blend: float = 0.0,
-    limbs: Array | None = None,
-    clip_seconds: float = 0.0,
-) -> CompiledReference:
+    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float, blend: float = 0.0,
+    limbs: Array | None = None, clip_seconds: float = 0.0,
+) -> CompiledReference:  # fmt: skip
     """The reference of a run, before its first update, without the addresses of the map's kernels.
 
     So nothing need be compiled yet; `reference_along` and `sim.loop.servo.Servo.linked` fill the addresses in.

@@ -155,15 +155,9 @@ class _Stage:
             return
         vertices, faces = tube(line, MAGNIFICATION * radius)
         self._scene.add_mesh_simple(
-            f"{node}/tube",
-            vertices,
-            faces,
-            color=rgb(course.tube),
-            opacity=0.16,
-            side="double",
-            cast_shadow=False,
+            f"{node}/tube", vertices, faces, color=rgb(course.tube), opacity=0.16, side="double", cast_shadow=False,
             receive_shadow=False,
-        )
+        )  # fmt: skip
 
     def play(self, server: viser.ViserServer) -> str:
         """Run through the recording and return the page."""

@@ -39,13 +39,9 @@ class ClockPanel:
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
         self._pace = gui.add_dropdown("Pace", tuple(PLAYBACK_RATES))
         self._look_back = gui.add_slider(
-            "Look back [s]",
-            -HISTORY_DURATION,
-            0.0,
-            0.1,
-            0.0,
+            "Look back [s]", -HISTORY_DURATION, 0.0, 0.1, 0.0,
             hint="Now is at the right; time stands still while you look.",
-        )
+        )  # fmt: skip
         self._resume = gui.add_button("Go on from there", visible=False)
         self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force comes back from zero.")
         self._grab.on_update(acts(lambda event: desk.press(self._grab.value)))
