@@ -27,9 +27,8 @@ from experiments.setups.wiring import wire
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
-from sim.viewer.courses import courses
 from sim.viewer.live_stage import LiveStage
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 
 
 @njit

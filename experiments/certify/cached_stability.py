@@ -9,10 +9,10 @@ from controllers.certificates.report import FROM_WORST, Outcome, hash_of, withou
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
-from experiments.files.atomic_file import atomic_file
 from experiments.setups.certified_law import governor_drag, uncertified_parts
 from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import results_folder
+from sim.compilation.whole_files import atomic_file
 
 _LEADING_REASON = "leading is certified by its regimes, of the clip that is led: hvf certify --mode lead"
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
-from experiments.files.atomic_file import atomic_file
 from experiments.files.json_text import json_text
 from models.phantom.parameters import PREMIUM_1_5
+from sim.compilation.whole_files import atomic_file
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, IdentificationResult

@@ -21,20 +21,18 @@ from experiments.live.driver import Driver
 from experiments.live.panels.clock_panel import ClockPanel, add_hand_keys
 from experiments.live.panels.gains_panel import GainsPanel
 from experiments.live.panels.plots import Plots
-from experiments.live.panels.run_panel import RunPanel
+from experiments.live.panels.run_panel import RunPanel, UploadsPanel
 from experiments.live.panels.status import FIRST_STEPS, status_html
 from experiments.live.panels.takes_panel import TakesPanel
-from experiments.live.panels.uploads_panel import UploadsPanel
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
 from models.errors import ModelError
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
-from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 

@@ -14,8 +14,8 @@ from experiments.render.graphics import offscreen_backend
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from sim.recording.recording import Recording, RecordingError
-from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, USER
+from sim.viewer.shown import courses
 
 FORCE = 30.0  # drawn length of the force in the last panel [mm]
 MOMENTS = 4

@@ -40,8 +40,7 @@ from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
-from sim.viewer.shown import Moment, RealTime
+from sim.viewer.shown import Moment, RealTime, courses
 
 if TYPE_CHECKING:
     from sim.viewer.live_page import LivePage

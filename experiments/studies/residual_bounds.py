@@ -16,7 +16,7 @@ from controllers.state import Array
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.library import embedded_names
 from models.mocap.motion.clip import Clip

@@ -18,10 +18,10 @@ from controllers.state import Array
 from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
-from sim.viewer.courses import Course, courses
 from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
+from sim.viewer.shown import Course, courses
 
 FPS = 30.0  # [1/s]
 SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown

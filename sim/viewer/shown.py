@@ -1,9 +1,42 @@
-"""A moment of a run that is displayed, and simulated time kept in step with the clock of a person who watches."""
+"""What is displayed of a run: its curves, and a moment of it; time kept in step with the clock of who watches."""
 
 import time
+from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from controllers.state import Array
+from sim.viewer.palette import CURVE, TUBE, river_colors
+
+
+class Course(NamedTuple):
+    """A curve as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+        Name of the river; empty for a run's only curve.
+    points : array (m, 3)
+        Points in the hand frame [m].
+    line, tube : str
+        Colours of curve and tube, ``#rrggbb``.
+    """
+
+    name: str
+    points: Array
+    line: str
+    tube: str
+
+
+def courses(static: Mapping[str, npt.ArrayLike | str]) -> tuple[Course, ...]:
+    """The curves in a recording's arrays and texts: ``curve``, or ``river_curves`` with their ``river_names``."""
+    if "river_curves" not in static:
+        return (Course("", np.asarray(static["curve"], dtype=np.float64), CURVE, TUBE),)
+    names, curves = str(static["river_names"]).split("\n"), np.asarray(static["river_curves"], dtype=np.float64)
+    drawn = zip(names, curves, river_colors(len(names)), strict=True)
+    return tuple(Course(name, points, color, color) for name, points, color in drawn)
 
 
 class Moment(NamedTuple):

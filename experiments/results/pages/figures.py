@@ -24,8 +24,8 @@ from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
+from sim.viewer.shown import courses
 
 POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"

@@ -19,9 +19,9 @@ from experiments.results.pages.mode_figures import arm_figure, lead_figure, stre
 from experiments.results.pages.plots import plots_html
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
 from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
+from sim.viewer.shown import courses
 
 
 def write_report_of(folder: Path) -> None:

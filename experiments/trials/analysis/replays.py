@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 
 from experiments.results.folder import RECORDING, world_of
 from experiments.trials.design.plan import Trial
-from experiments.trials.trial.measures import MEASURES
+from experiments.trials.trial.measures import MEASURES, TrialLog
 from experiments.trials.trial.run_trial import MapCache, run_recorded
-from experiments.trials.trial.trial_log import TrialLog
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
 

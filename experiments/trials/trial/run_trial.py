@@ -18,8 +18,7 @@ from experiments.results.folder import RECORDING
 from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from experiments.trials.trial.measures import measure_trial
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog, measure_trial
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder

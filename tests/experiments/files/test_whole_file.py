@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.files import atomic_file as whole
-from experiments.files.atomic_file import atomic_file
 from experiments.files.device_files import save_device
 from experiments.files.map_files import write_arrays
 from experiments.lifting import lift_report
+from sim.compilation import whole_files as whole
+from sim.compilation.whole_files import atomic_file
 
 
 def test_file_appears_only_once_closed(tmp_path: Path) -> None:

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from models.world.scene import SceneConfig, world_model
-from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
 from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, workspace_position
 from sim.viewer.shapes import body_shapes, simplify_shapes
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 
 ANGLE = np.linspace(0, 6, 30)
 CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
