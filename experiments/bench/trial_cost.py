@@ -26,18 +26,10 @@ _THREAD_COUNT, _SHORT_TIME, _SHORT_COUNT = 2, 0.02, 2_000  # simultaneous trials
 
 
 class TrialCost(NamedTuple):
-    """Ratios of one study of `_make_study`, without a figure, and its trials.
+    """Ratios of a study without a figure to its trials, and its start time.
 
-    Attributes
-    ----------
-    overhead : float
-        Processor time of planning, driving and database over that of the trials.
-    scaling : float
-        Trials per second of two threads, over twice those of one.
-    grown : float
-        Memory after 2000 short trials, over that after the first 400.
-    start : float
-        Time from the start of a process to its first row, with the code already compiled [s].
+    Processor time beside the trials over theirs; trials per second of two threads over twice those of one; memory after
+    2000 short trials over that after 400; time from the start of a process to its first row, with code compiled [s].
     """
 
     overhead: float

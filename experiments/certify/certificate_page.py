@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from html import escape
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.hand import HandImpedance
@@ -121,44 +122,39 @@ def stability_figure(river: River, verdict: Verdict) -> Figure:
     """Stability boundary of the gains with the river's own gains, and the critical stiffness along the curve."""
     damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
     critical = boundary(river, damping)
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
-    gains, along = figure.subplots(1, 2)
+    figure, (gains, along) = _two_panels()
     gains.fill_between(damping, 1.0, np.maximum(critical, 1.0), color="#dbe7f4", label="stable at every phase, no hand")
     gains.plot(damping, critical, color="#2f6db3")
     gains.plot(river.b_d, river.k_r, "o", color="#c2473b", label="this river")
     gains.set(xscale="log", yscale="log", xlabel="b_d [N s/m]", ylabel="k_r [N/m]", ylim=(10.0, None))
-    gains.set_title("stability boundary", loc="left")
-    gains.legend(frameon=False, fontsize=8, loc="lower center")
+    _name(gains, "stability boundary", "lower center")
     phases = np.asarray(verdict.figures["phases"], dtype=np.float64)
     along.plot(phases, np.asarray(verdict.figures["critical_stiffness"], dtype=np.float64), color="#2f6db3")
     along.axhline(river.k_r, color="#c2473b", label="this river")
     along.set(yscale="log", xlabel="phase [s]", ylabel="critical k_r [N/m]")
-    along.set_title("along the curve, worst hand", loc="left")
-    along.legend(frameon=False, fontsize=8)
+    _name(along, "along the curve, worst hand")
     return figure
 
 
 def region_figure(verdict: Verdict) -> Figure:
     """Region of attraction and the ball reached, over offset and speed error, for the lightest and heaviest hand."""
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    figure, panels = _two_panels()
     edges = np.asarray(verdict.figures["ellipse"], dtype=np.float64)
     masses = np.asarray(verdict.figures["masses"], dtype=np.float64)
-    for axes, (outer, inner), mass in zip(figure.subplots(1, 2), edges, masses, strict=True):
+    for axes, (outer, inner), mass in zip(panels, edges, masses, strict=True):
         label = "region, firm hands" if "firm_hands" in verdict.figures else "region"
         axes.fill(1e3 * outer[:, 0], outer[:, 1], color="#dbe7f4", label=label)
         axes.plot(1e3 * outer[:, 0], outer[:, 1], color="#2f6db3")
         axes.fill(1e3 * inner[:, 0], inner[:, 1], color="#c2473b", alpha=0.5, label="ball that is reached")
         axes.set(xlabel="offset across the curve [mm]", ylabel="speed off its pace [m/s]")
-        axes.set_title(f"{mass:.2f} kg at the tip", loc="left")
-        axes.legend(frameon=False, fontsize=8, loc="upper right")
+        _name(axes, f"{mass:.2f} kg at the tip", "upper right")
     return figure
 
 
 def flights_figure(found: ClipBallistics) -> Figure:
     """Height of the centre of mass, with free fall between the ends of each flight, and admissible rates of a lap."""
     motion, lap = found.motion, len(found.bounds.low)
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
-    height, rates = figure.subplots(1, 2)
+    figure, (height, rates) = _two_panels()
     times = np.arange(lap) / motion.fps
     height.plot(times, motion.com[:lap, 2], color="#566072", label="centre of mass")
     for number, flight in enumerate(found.flights):
@@ -166,16 +162,10 @@ def flights_figure(found: ClipBallistics) -> Figure:
         t = np.linspace(0.0, fit.duration, 50)
         height.axvspan(fit.time, fit.time + fit.duration, color=_COLOURS[flight.verdict], alpha=0.15, lw=0)
         fall = motion.com[fit.start, 2] + fit.take_off_speed * t - 0.5 * GRAVITY * t**2
-        height.plot(
-            fit.time + t,
-            fall,
-            "--",
-            color=_COLOURS[flight.verdict],
-            label=None if number else "free fall between its ends",
-        )
+        label = None if number else "free fall between its ends"
+        height.plot(fit.time + t, fall, "--", color=_COLOURS[flight.verdict], label=label)
     height.set(xlabel="time [s]", ylabel="height [m]")
-    height.set_title("flights", loc="left")
-    height.legend(frameon=False, fontsize=8)
+    _name(height, "flights")
     low, high = (np.clip(np.nan_to_num(rate, posinf=_RATE_RANGE[1]), *_RATE_RANGE) for rate in found.bounds[:2])
     rates.fill_between(
         times, low, np.maximum(low, high), color="#dbe7f4", label="in flight by gravity, else by friction", step="mid"
@@ -184,9 +174,18 @@ def flights_figure(found: ClipBallistics) -> Figure:
     rates.set(yscale="log", xlabel="time [s]", ylabel="rate σ", ylim=_RATE_RANGE)
     rates.set_yticks([0.25, 0.5, 1.0, 2.0, 4.0], ["0.25", "0.5", "1", "2", "4"])
     rates.minorticks_off()
-    rates.set_title("admissible rates", loc="left")
-    rates.legend(frameon=False, fontsize=8)
+    _name(rates, "admissible rates")
     return figure
+
+
+def _two_panels() -> tuple[Figure, Any]:
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    return figure, figure.subplots(1, 2)
+
+
+def _name(axes: Axes, title: str, legend: Any = "best") -> None:
+    axes.set_title(title, loc="left")
+    axes.legend(frameon=False, fontsize=8, loc=legend)
 
 
 def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:

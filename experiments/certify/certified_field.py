@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.loop.hand import HandRange
@@ -85,7 +85,7 @@ def _curves_of_file(config: RunConfig, part: MapFile, retime: _Retiming) -> dict
     return {"" if name == first else f"_{name}": retime(lifted_curve(found, name)) for name in names}
 
 
-MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
+MAP_CURVES: dict[str, Callable[[RunConfig, Any, _Retiming], dict[str, Trajectory]]] = {
     "cylindrical": _circle, "composite": _circle, "rivers": _circle, "file": _curves_of_file, "led": _lead_curve,
     "robot-arm": _tilted_circle,
 }  # fmt: skip

@@ -30,15 +30,7 @@ _MAX_TORQUE = max(PREMIUM_1_5.peak_torque)
 
 
 class Calibration(NamedTuple):
-    """The device to which the encoder zero of a device file belongs.
-
-    Attributes
-    ----------
-    name, serial : str
-        Name and serial number of the device.
-    power_up : int
-        See `sim.devices.driver.DeviceIdentity`.
-    """
+    """Name, serial number and `power_up` of the device to which the encoder zero of a device file belongs."""
 
     name: str
     serial: str

@@ -18,19 +18,7 @@ _N_CORNERS = 28  # of an outline
 
 
 class Outline(NamedTuple):
-    """Projected outline of a geom.
-
-    Attributes
-    ----------
-    body : str
-        Body of the geom.
-    rgba : array (4,)
-        Colour in the model.
-    depth : float
-        Depth of its centre, away from the viewer [m].
-    corners : array (n, 2)
-        Corners: to the right, and up [m].
-    """
+    """Outline of a geom: its body, colour in the model (4,), depth from the viewer and corners (n, 2) [m]."""
 
     body: str
     rgba: Array

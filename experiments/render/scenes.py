@@ -83,15 +83,7 @@ _ARROW, _ROD = mujoco.mjtGeom.mjGEOM_ARROW, mujoco.mjtGeom.mjGEOM_CAPSULE
 
 
 class Clearance(NamedTuple):
-    """Lowest point of a figure in a film, before it is lifted onto the floor for drawing.
-
-    Attributes
-    ----------
-    lowest : float
-        Height of the lowest point over the floor [m].
-    at : float
-        Time at which it occurs [s].
-    """
+    """Lowest point of a figure in a film over the floor [m], before it is drawn higher, and its time [s]."""
 
     lowest: float
     at: float

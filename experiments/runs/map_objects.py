@@ -1,12 +1,13 @@
 """Haptic maps as objects, from which a simulation makes the map of its figure or robot arm."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
+from mujoco import MjModel
 
 from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
@@ -20,8 +21,7 @@ from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
 from experiments.setups.maps.about_circle import Place, check_clips
-from experiments.setups.maps.composite import PARTS, composite_parts
-from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
+from experiments.setups.maps.cylindrical import CORNERS, PARTS, composite_parts, cylindrical_parts
 from experiments.setups.maps.map_file import lifted_parts
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
@@ -48,6 +48,8 @@ class _AboutCurve:
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
+    made: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
+    """Makes the map's parts for a figure."""
 
     clips: Sequence[Clip]
     around: Trajectory = field(repr=False)
@@ -64,6 +66,10 @@ class _AboutCurve:
 
     def __repr__(self) -> str:
         return short_text(self)
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return for_size_of(world.body, lambda model: self.made(tuple(self.clips), model, self._place()))
 
     def _place(self) -> Place:
         curve = check_reach(self.around)
@@ -94,11 +100,7 @@ class Cylindrical(_AboutCurve):
         If the Phantom does not reach the curve.
     """
 
-    most = CORNERS
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: cylindrical_parts(tuple(self.clips), model, self._place()))
+    most, made = CORNERS, staticmethod(cylindrical_parts)
 
 
 @dataclass(frozen=True, repr=False)
@@ -118,11 +120,7 @@ class Composite(_AboutCurve):
         As `Cylindrical`, of three clips.
     """
 
-    most = PARTS
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: composite_parts(tuple(self.clips), model, self._place()))
+    most, made = PARTS, staticmethod(composite_parts)
 
 
 @dataclass(frozen=True)

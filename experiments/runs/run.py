@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -193,7 +194,7 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
         field = session.servo.field
         of = Measuring(
             recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state,
-            lambda curve: save_curve(curve, out / CURVE_FILE),
+            partial(save_curve, path=out / CURVE_FILE),
         )  # fmt: skip
         return parts.summarise(summary, of)
 

@@ -23,13 +23,7 @@ BLOCK_SECONDS = 0.2  # simulated time of a block [s]: the clock and the recorder
 
 
 class RunTimes(NamedTuple):
-    """Speed of a run.
-
-    Attributes
-    ----------
-    simulated, wall : float
-        Simulated time, and the wall-clock time it took [s].
-    """
+    """Simulated time of a run, and the wall-clock time it took [s]."""
 
     simulated: float
     wall: float

@@ -12,17 +12,7 @@ from sim.viewer.palette import CURVE, TUBE, river_colors
 
 
 class Course(NamedTuple):
-    """A curve as it is drawn.
-
-    Attributes
-    ----------
-    name : str
-        Name of the river; empty for a run's only curve.
-    points : array (m, 3)
-        Points in the hand frame [m].
-    line, tube : str
-        Colours of curve and tube, ``#rrggbb``.
-    """
+    """A curve as it is drawn: name of the river or empty, points (m, 3) in H [m], colours ``#rrggbb``."""
 
     name: str
     points: Array

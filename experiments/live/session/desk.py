@@ -229,26 +229,24 @@ class Desk:
         if not self._undo_stack:
             self._say("Nothing is left to undo.")
             return
-        doing = self._undo_stack.pop()
-        self._redo_stack.append(doing)
-        if doing.before is None:
-            self._expected_bends = self._bend_count - 1
-            self.engine.ask(Order.UNDO)
-        else:
-            self._apply_config(doing.before)
+        self._redo_stack.append(self._undo_stack.pop())
+        self._go_to(self._redo_stack[-1].before, -1)
 
     def redo(self) -> None:
         """Redo the last undone action."""
         if not self._redo_stack:
             self._say("Nothing is left to do again.")
             return
-        doing = self._redo_stack.pop()
-        self._undo_stack.append(doing)
-        if doing.after is None:
-            self._expected_bends = self._bend_count + 1
-            self.engine.ask(Order.REDO)
-        else:
-            self._apply_config(doing.after)
+        self._undo_stack.append(self._redo_stack.pop())
+        self._go_to(self._undo_stack[-1].after, 1)
+
+    def _go_to(self, config: RunConfig | None, bends: int) -> None:
+        """Apply a configuration; without one, undo (−1) or redo (1) a bend."""
+        if config is not None:
+            self._apply_config(config)
+            return
+        self._expected_bends = self._bend_count + bends
+        self.engine.ask(Order.REDO if bends > 0 else Order.UNDO)
 
     def _apply_config(self, config: RunConfig) -> None:
         self.config = config

@@ -17,7 +17,7 @@ from experiments.fitting.push_trials import followed_map
 from experiments.fitting.similarity import arms
 from experiments.fitting.transition_places import carried_over
 from experiments.setups.maps.about_circle import about_circle, place_of
-from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.modes.fixed_curve import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,
     best_transition,

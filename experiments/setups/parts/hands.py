@@ -39,13 +39,7 @@ _MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
 
 
 class Beginning(NamedTuple):
-    """Position, velocity and acceleration of the stylus when a run begins, in H.
-
-    Attributes
-    ----------
-    point, velocity, acceleration : Array
-        [m], [m/s], [m/s²], shape (3,).
-    """
+    """Position [m], velocity [m/s] and acceleration [m/s²] of the stylus when a run begins, in H, shapes (3,)."""
 
     point: Array
     velocity: Array

@@ -13,15 +13,7 @@ from sim.viewer.replay_html import replay_html
 
 
 class Replay(NamedTuple):
-    """Replay of a trial.
-
-    Attributes
-    ----------
-    title : str
-        Which trial it is, and why it is shown.
-    page : str
-        The replay, a complete HTML document.
-    """
+    """Replay of a trial: which one it is and why it is shown, and the replay, a complete HTML document."""
 
     title: str
     page: str

@@ -12,15 +12,7 @@ _COLUMNS = ("key", "user", "repetition", "position", "seed", "state", "reason", 
 
 
 class Condition(NamedTuple):
-    """A combination of one level of every factor.
-
-    Attributes
-    ----------
-    levels : dict
-        Name of the level by name of the factor.
-    words : Words
-        Parameters of a run that the levels set.
-    """
+    """Levels of all factors, by name of the factor, and the parameters of a run that they set."""
 
     levels: dict[str, str]
     words: Words

@@ -27,17 +27,7 @@ State = Literal["done", "failed"]
 
 
 class Task(NamedTuple):
-    """A trial as it is given to a worker.
-
-    Attributes
-    ----------
-    key : str
-        Key of the trial.
-    config : str
-        Configuration of the trial, as JSON.
-    recordings : str
-        Folder or URL for its recording; empty for none.
-    """
+    """A trial for a worker: key, configuration as JSON, and folder or URL for its recording, or empty."""
 
     key: str
     config: str
