@@ -84,7 +84,7 @@ class MapCache:
                     session = wire(config, ready=ready)
                     # The map was already refined when this session was assembled.
                     self._maps[key] = replace(session.parts.maps, refined=None)
-        return wire(config, ready=ready, maps_of=lambda *_: self._maps[key])
+        return wire(config, ready=ready, maps_of=lambda config, figure, clips: self._maps[key])
 
 
 def _map_key(config: RunConfig) -> object:
