@@ -8,7 +8,7 @@ from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from experiments.config.keywords import to_keywords, with_keyword_messages
 from experiments.files.given_path import given_path
-from experiments.lifting.lift_file import lift_into
+from experiments.lifting.lift_report import lift_into
 from experiments.preparation.command import prepare_file
 from experiments.preparation.prepared_clip import prepared_clips
 from models.mocap.library import embedded, embedded_names

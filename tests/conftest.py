@@ -109,4 +109,4 @@ Dispatcher.compile = _compile_or_load
 @pytest.fixture
 def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs write neither figures nor a report page, which would take longer than the run itself."""
-    monkeypatch.setattr("experiments.results.pages.report_of.write_report_of", lambda folder: None)
+    monkeypatch.setattr("experiments.results.pages.report.write_report_of", lambda folder: None)

@@ -20,21 +20,18 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HandState, stylus_path
-from experiments.bench.field_cost import heaviest_field, tick_microseconds
-from experiments.bench.figure_cost import figure_cost
-from experiments.bench.figures import BenchmarkResult, print_figures
-from experiments.bench.page_cost import picture_microseconds
+from experiments.bench.figures import BenchmarkResult
+from experiments.bench.part_costs import heaviest_field, picture_microseconds, recorder_cost, tick_microseconds
 from experiments.bench.prepare_cost import prepare_cost
-from experiments.bench.recorder_cost import recorder_cost
-from experiments.bench.tick_cost import MODES, STEP, prepared, tick_cost
+from experiments.bench.tick_cost import MODES, STEP, figure_cost, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
 from experiments.config.options import run_config
 from experiments.fitting.figure_legs import figure_legs
 from experiments.results.folder import SUMMARY
+from experiments.setups.modes.fixed_curve import figure_walls
 from experiments.setups.parts.clips import load_clips
-from experiments.setups.parts.walls import figure_walls
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from geometry.arrays import Array, IntArray
@@ -50,11 +47,6 @@ from sim.loop.servo import run_block
 ROUNDS = 7  # of which the fastest counts
 _LIBRARY_IMPORTS = "import mujoco, numba, h5py, scipy.interpolate, rich, pydantic"
 """Imports that any program of these libraries needs before its first tick."""
-
-
-def bench(as_json: bool, check: bool) -> int:
-    """Measure and print all figures; see `experiments.bench.figures.print_figures` for the arguments and the result."""
-    return print_figures(figures(), as_json, check)
 
 
 def figures() -> Iterator[BenchmarkResult]:
@@ -120,11 +112,9 @@ def figures() -> Iterator[BenchmarkResult]:
     yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
     yield BenchmarkResult("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
     yield in_mj_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
-    preparing = prepare_cost()
-    yield BenchmarkResult("preparing captures, processor time", preparing.clip, "× the clips' duration", at_most=6.0)
-    yield BenchmarkResult(
-        "preparing captures, against simulating their figure", preparing.simulating, "× the processor time"
-    )
+    per_second, per_simulated = prepare_cost()
+    yield BenchmarkResult("preparing captures, processor time", per_second, "× the clips' duration", at_most=6.0)
+    yield BenchmarkResult("preparing captures, against simulating their figure", per_simulated, "× the processor time")
 
 
 def libraries_seconds() -> float:
@@ -259,11 +249,10 @@ def _evaluate_walls(maps: Maps, field: Compiled, memory: Array, hands: Array, wr
 
 def walls_microseconds(session: Session) -> float:
     """Mean time of a tick of the figure's soft walls for a hand on the default curve [µs]."""
-    curve, numbers = session.curve, JointWalls()
+    curve = session.curve
     times = np.linspace(0.0, curve.duration, 4000)
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
-    walls = figure_walls(session.haptic_map, numbers.wall_stiffness, numbers.wall_margin, numbers.joint_speed)
-    program, wrench = walls.program(), np.empty(6)
+    program, wrench = figure_walls(session.haptic_map, JointWalls()).program(), np.empty(6)
     memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.map_feeds)
     maps = maps._replace(stages=linked_stages(maps.stages))
     _evaluate_walls(maps, field, memory, hands[:2], wrench)

@@ -2,7 +2,6 @@
 
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -22,23 +21,11 @@ _JOINT_ERROR, _ROOT_ERROR, _CORRELATION_TIME = np.deg2rad(2.0), 0.01, 0.1
 _FOLLOWING_TIME = 5.0  # [s] for which the physical figure follows each clip
 
 
-class PrepareCost(NamedTuple):
-    """Processor time of the preparation of captures.
+def prepare_cost() -> tuple[float, float]:
+    """Prepare clips with errors like those of captures, and let the physical figure follow them for as long.
 
-    Attributes
-    ----------
-    clip : float
-        Divided by the duration of the prepared clips.
-    simulating : float
-        Divided by that of simulating, for the same duration, the physical figure that follows them.
+    Returns the processor time of preparing, over the clips' duration and over the processor time of following.
     """
-
-    clip: float
-    simulating: float
-
-
-def prepare_cost() -> PrepareCost:
-    """Prepare embedded clips with errors like those of captures, and let the physical figure follow them."""
     rng = np.random.default_rng(0)
     preparing_time = clip_time = simulating_time = 0.0
     with tempfile.TemporaryDirectory() as folder:
@@ -51,7 +38,7 @@ def prepare_cost() -> PrepareCost:
                 continue  # warm-up: compiles
             preparing_time, clip_time = preparing_time + result.seconds, clip_time + result.clip.duration
             simulating_time += result.clip.duration * cost
-    return PrepareCost(preparing_time / clip_time, preparing_time / simulating_time)
+    return preparing_time / clip_time, preparing_time / simulating_time
 
 
 def _add_capture_errors(clip: Clip, rng: np.random.Generator) -> Clip:

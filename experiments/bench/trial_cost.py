@@ -19,25 +19,17 @@ from experiments.trials.design.plan import Trial, plan_trials
 from experiments.trials.design.study_config import StudyConfig, parse_study
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps, run_missing
-from experiments.trials.execution.threads import Threads
-from experiments.trials.trial.run_trial import MAP_CACHE, Row, Task
+from experiments.trials.execution.executors import Threads
+from experiments.trials.trial.run_trial import Row, Task
 
 _THREAD_COUNT, _SHORT_TIME, _SHORT_COUNT = 2, 0.02, 2_000  # simultaneous trials; short trials: duration [s] and number
 
 
 class TrialCost(NamedTuple):
-    """Ratios of one study of `_make_study`, without a figure, and its trials.
+    """Ratios of a study without a figure to its trials, and its start time.
 
-    Attributes
-    ----------
-    overhead : float
-        Processor time of planning, driving and database over that of the trials.
-    scaling : float
-        Trials per second of two threads, over twice those of one.
-    grown : float
-        Memory after 2000 short trials, over that after the first 400.
-    start : float
-        Time from the start of a process to its first row, with the code already compiled [s].
+    Processor time beside the trials over theirs; trials per second of two threads over twice those of one; memory after
+    2000 short trials over that after 400; time from the start of a process to its first row, with code compiled [s].
     """
 
     overhead: float
@@ -56,7 +48,7 @@ def trial_cost() -> TrialCost:
 
 def overhead(users: int, seconds: float, console: Console) -> tuple[float, float]:
     """Processor time of planning, driving and database over that of the trials, and the total time [s]."""
-    compile_and_make_maps([trial.config for trial in plan_trials(_make_study(1, 0.1))[:1]], MAP_CACHE, console)
+    compile_and_make_maps([trial.config for trial in plan_trials(_make_study(1, 0.1))[:1]], console)
     begin = time.process_time()
     trial_seconds, study_seconds = _run_study(_make_study(users, seconds), Threads(1), console)
     return (time.process_time() - begin) / trial_seconds - 1.0, study_seconds
@@ -96,7 +88,7 @@ def first_row() -> None:
     """Run the first trial of a study, and print its state."""
     study = _make_study(1, _SHORT_TIME)
     trial = plan_trials(study)[0]
-    compile_and_make_maps([trial.config], MAP_CACHE, Console(stderr=True, quiet=True))
+    compile_and_make_maps([trial.config], Console(stderr=True, quiet=True))
     print(next(iter(Threads(1).rows([Task(trial.key, to_json(trial.config))]))).state, flush=True)
 
 

@@ -22,19 +22,7 @@ _RATE_COUNT = 13  # number of rates flown by the physical figure
 
 
 class FlownClip(NamedTuple):
-    """The longest flight of a clip, flown by the physical figure at many rates.
-
-    Attributes
-    ----------
-    name : str
-        Name of the clip.
-    ballistics : ClipBallistics
-        Its ballistics and certificate.
-    flight : FlightJudgement
-        The flight.
-    trials : list of FlightTrial
-        One for every rate.
-    """
+    """A clip, and the trials of its longest flight, flown by the physical figure at many rates."""
 
     name: str
     ballistics: ClipBallistics

@@ -3,17 +3,16 @@
 import json
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.report import FROM_WORST, Outcome, hash_of, without_laws
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
-from experiments.files.atomic_file import atomic_file
 from experiments.setups.certified_law import governor_drag, uncertified_parts
 from experiments.setups.parts.defaults import resolved
 from sim.compilation.sources import results_folder
+from sim.compilation.whole_files import atomic_file
 
 _LEADING_REASON = "leading is certified per regime, for the led clip: hvf certify --mode lead"
 
@@ -56,7 +55,9 @@ def cached_stability(config: RunConfig) -> Stability:
         return Stability(**json.loads(file.read_text(encoding="utf-8")))
     found = _certify_stability(config, hands)
     with suppress(OSError):
-        _write_whole(file, json.dumps(asdict(found)))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(file) as draft:
+            draft.write(json.dumps(asdict(found)).encode())
     return found
 
 
@@ -74,9 +75,3 @@ def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
     worst = min(verdicts, key=lambda verdict: FROM_WORST.index(verdict.verdict))
     margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)
-
-
-def _write_whole(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(path) as file:
-        file.write(text.encode())

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.loop.hand import HandRange
@@ -51,11 +51,7 @@ def given_curves(config: RunConfig) -> dict[str, Trajectory]:
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach a lifted one, or there is no such map.
     """
-    return MAP_CURVES[config.map.kind](config, config.map, _unchanged)
-
-
-def _unchanged(curve: Trajectory) -> Trajectory:
-    return curve
+    return MAP_CURVES[config.map.kind](config, config.map, lambda curve: curve)
 
 
 def _lead_curve(config: RunConfig, part: Led, retime: _Retiming) -> dict[str, Trajectory]:
@@ -89,7 +85,7 @@ def _curves_of_file(config: RunConfig, part: MapFile, retime: _Retiming) -> dict
     return {"" if name == first else f"_{name}": retime(lifted_curve(found, name)) for name in names}
 
 
-MAP_CURVES: dict[str, Callable[..., dict[str, Trajectory]]] = {
+MAP_CURVES: dict[str, Callable[[RunConfig, Any, _Retiming], dict[str, Trajectory]]] = {
     "cylindrical": _circle, "composite": _circle, "rivers": _circle, "file": _curves_of_file, "led": _lead_curve,
     "robot-arm": _tilted_circle,
 }  # fmt: skip
@@ -127,13 +123,9 @@ def _flatten(values: Mapping[str, object]) -> dict[str, object]:
 
 
 def certificate_inputs(
-    config: RunConfig,
-    delay: float,
-    hands: HandRange,
-    push: float,
-    clips: Sequence[Clip] = (),
+    config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = (),
     judging: JudgementCriteria = DEFAULT_CRITERIA,
-) -> dict[str, object]:
+) -> dict[str, object]:  # fmt: skip
     """All data on which the verdicts on a run's field depend, by name, for `hash_of`.
 
     Parameters

@@ -1,6 +1,5 @@
 """Certificate of LEADING: stability in every regime of its force along the default S, in all directions of the path."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -87,7 +86,8 @@ def certify_leading(
     verdicts: dict[str, Verdict] = {}
     for name, regimes in leading_regimes(field).items():
         found = [stability(leading_river(field, it, curve, device, sampling), hands.hands()) for it in regimes]
-        verdicts["stability" + name] = _worst_verdict(found)
+        worst = min(found, key=lambda verdict: (FROM_WORST.index(verdict.verdict), verdict.margin or 0.0))
+        verdicts["stability" + name] = replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))
     radius = max(_walker_radius(field, regime, curve, device, sampling, hands) for regime in _FOLLOWING_REGIMES)
     for name in ("stability", "stability_back"):
         verdict = verdicts[name]
@@ -144,9 +144,3 @@ def _walker_radius(
         matrices = walking(loop, regime, settings.scale, settings.rate, field.k_l, field.b)
         radii.append(np.abs(np.linalg.eigvals(matrices)).max())
     return float(max(radii))
-
-
-def _worst_verdict(verdicts: Sequence[Verdict]) -> Verdict:
-    """The worst verdict; of equal verdicts, the one with the smallest margin."""
-    worst = min(verdicts, key=lambda found: (FROM_WORST.index(found.verdict), found.margin or 0.0))
-    return replace(worst, assumptions=(*worst.assumptions, *_ASSUMPTIONS))

@@ -31,15 +31,7 @@ from geometry.arrays import Array
 
 
 class Meeting(NamedTuple):
-    """The place at which one river is nearest to another.
-
-    Attributes
-    ----------
-    own, other : int
-        Indices of the two rivers.
-    phase : float
-        Phase on the first [s].
-    """
+    """Two rivers, by index, and the phase on the first [s] at which it is nearest to the second."""
 
     own: int
     other: int

@@ -88,14 +88,9 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
 
 
 def certify_into(
-    config: RunConfig,
-    out: Path,
-    delay: float = 0.0,
-    hands: HandRange | None = None,
-    push: float = 1.0,
-    clips: Sequence[Clip] = (),
-    judging: JudgementCriteria = DEFAULT_CRITERIA,
-) -> Certificate:
+    config: RunConfig, out: Path, delay: float = 0.0, hands: HandRange | None = None, push: float = 1.0,
+    clips: Sequence[Clip] = (), judging: JudgementCriteria = DEFAULT_CRITERIA,
+) -> Certificate:  # fmt: skip
     """Certify a run's field and clips, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters

@@ -100,7 +100,11 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     phantom_of(sim.device)
     hands = hands or HandRange()
     inputs = hash_of((sim.field.description(), sim.clock, sim.device, hands, delay))
-    own_laws, curve = [law for law in sim.field.program().laws if isinstance(law, FunctionLaw)], _curve_of(sim)
+    laws = sim.field.program().laws
+    own_laws = [law for law in laws if isinstance(law, FunctionLaw)]
+    # The curve about which the field is examined: that of its leading law, or the map's.
+    curves = [law.curve for law in laws if isinstance(law, Follow | Bunny)]
+    curve: Trajectory | None = next(iter(curves), getattr(sim.haptic_map, "around", None))
     for law in own_laws if curve is not None else ():
         with suppress(NotExecutable):  # left by an earlier certificate; it makes this one unknown, below
             executed(law, curve)  # pyright: ignore[reportArgumentType]
@@ -124,12 +128,6 @@ def certify(sim: Simulation, hands: HandRange | None = None, delay: float = 0.0)
     return SimulationCertificate(
         _add_assumptions(stability, assumptions), _add_assumptions(passivity_verdict, assumptions), inputs
     )
-
-
-def _curve_of(sim: Simulation) -> Trajectory | None:
-    """The curve about which a field is examined: that of its leading law, or the map's; None if there is none."""
-    curves = [law.curve for law in sim.field.program().laws if isinstance(law, Follow | Bunny)]
-    return next(iter(curves), getattr(sim.haptic_map, "around", None))
 
 
 def _check_executed(

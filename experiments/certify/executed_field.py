@@ -13,7 +13,6 @@ from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program
 from controllers.safety.limiter import ForceLimiter
 from experiments.config.run_config import RunConfig
-from experiments.setups.parts.part_types import Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.mocap.motion.clip import Clip
 from sim.world.world import World
@@ -23,20 +22,9 @@ MAX_OFFSET_FRACTION = 0.2  # fraction of the map's reach: distance off the curve
 MAX_SPEED_RATIO = 2.0  # speed of a hand that pushes forwards at the edge of the map, relative to the curve's
 
 
-def executed_parts(config: RunConfig, clips: Sequence[Clip]) -> Parts:
-    """The parts of a run, as `wire` makes them.
-
-    Raises
-    ------
-    ModelError, ControllerError, SimError
-        As `experiments.setups.wiring.wire`.
-    """
-    return parts_of(config, map_parts(config, World(config.scene, config.body).body, tuple(clips) or None))
-
-
 def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
     """A verdict that omits walls, complemented by a check of the executed program (`check_executed`)."""
-    parts = executed_parts(config, clips)
+    parts = parts_of(config, map_parts(config, World(config.scene, config.body).body, tuple(clips) or None))
     reach = float(getattr(parts.maps, "reach", DEFAULT_REACH))
     return check_executed(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
@@ -53,7 +41,10 @@ def check_executed(program: Program, main: River, reach: float, verdict: Verdict
         reason = (
             f"unstable, by a factor of {found.radius:.4g} a period, for a hand {_place(main, found)}; {verdict.reason}"
         )
-        return Verdict("refuted", reason, None, verdict.assumptions, _counterexample(found), figures)
+        case: dict[str, object] = {
+            "phase": found.phase, "p": found.p, "v": found.v, "hand": found.hand, "radius": found.radius
+        }  # fmt: skip
+        return Verdict("refuted", reason, None, verdict.assumptions, case, figures)
     peak = ForceLimiter(main.sampling.period).peak
     limit_text = f", its force up to {strongest:.3g} N, which the limiter cuts" if strongest > peak else ""
     abrupt = [at for it in examined for at in it.abrupt]
@@ -72,7 +63,3 @@ def check_executed(program: Program, main: River, reach: float, verdict: Verdict
 def _place(main: River, found: WorstState) -> str:
     off, speed = 1e3 * np.linalg.norm(found.p - main.curve.point(found.phase)), np.linalg.norm(found.v)
     return f"{off:.2g} mm off the curve at phase {found.phase:.3g} s with {speed:.3g} m/s"
-
-
-def _counterexample(found: WorstState) -> dict[str, object]:
-    return {"phase": found.phase, "p": found.p, "v": found.v, "hand": found.hand, "radius": found.radius}

@@ -54,14 +54,12 @@ def _first_without_common(
         last: Array | None = None
         for phase, phase_maps, basis in zip(rivers[0].phases().tolist(), maps, loops[0].across[0], strict=True):
             # The function of the previous phase, in the coordinates of this phase, usually serves here too.
-            if last is not None and contraction(_symmetrise(basis.T @ last @ basis), list(phase_maps)) < 1.0:
-                continue
+            if last is not None:
+                here = basis.T @ last @ basis
+                if contraction(0.5 * (here + here.T), list(phase_maps)) < 1.0:
+                    continue
             found = common_lyapunov(list(phase_maps))
             if found is None:
                 return phase, hand
             last = basis @ found.p @ basis.T
     return None
-
-
-def _symmetrise(p: Array) -> Array:
-    return 0.5 * (p + p.T)

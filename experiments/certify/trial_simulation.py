@@ -61,13 +61,7 @@ class Executed(NamedTuple):
 
 @entry_point
 def run_delayed(
-    plant: Plant,
-    port: PhantomPort,
-    hand: Hand,
-    field: Executed,
-    late: Array,
-    rounded: bool,
-    path: Array,
+    plant: Plant, port: PhantomPort, hand: Hand, field: Executed, late: Array, rounded: bool, path: Array
 ) -> None:
     """The servo's loop with one device, without limiter and figure, with torques delayed by whole periods.
 
@@ -242,12 +236,7 @@ def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state
 
 
 def hand_path(
-    trial: Trial,
-    k_r: float,
-    ticks: int,
-    conditions: Conditions,
-    state: Array | None = None,
-    user: Arm | None = None,
+    trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None, user: Arm | None = None
 ) -> Array:
     """Position of the hand in H at each tick [m], shape (n, 3), n ≤ ticks, after a release beside the curve.
 

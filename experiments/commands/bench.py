@@ -16,7 +16,8 @@ class Command:
 
     def __call__(self) -> int:
         """Measure."""
-        from experiments.bench.benchmarks import bench
+        from experiments.bench.benchmarks import figures
+        from experiments.bench.figures import print_figures
 
         with working("measuring speed"):
-            return bench(self.json, self.check)
+            return print_figures(figures(), self.json, self.check)

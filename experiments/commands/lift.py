@@ -34,7 +34,7 @@ class Command:
 
     def __call__(self) -> int:
         """Lift the clips, and report on the map."""
-        from experiments.lifting.lift_file import lift_into
+        from experiments.lifting.lift_report import lift_into
 
         with working("lifting", len(self.clips)):
             report = lift_into(

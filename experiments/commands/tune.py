@@ -26,7 +26,7 @@ class Command(Where):
         """Tune, and report the chosen values."""
         from dataclasses import replace
 
-        from experiments.trials.design.errors import StudyError
+        from experiments.trials.design.study_config import StudyError
         from experiments.tuning.tune_config import read_tuning
 
         config = read_tuning(self.tuning)

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
+from controllers.certificates.loop.hand import MAX_DAMPING, MAX_STIFFNESS
 from controllers.errors import ParameterError
 from experiments.config.part import above, at_least, part
 

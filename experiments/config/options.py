@@ -73,15 +73,12 @@ def _vocabulary() -> dict[str, Option]:
             help_text = help_texts.get(option.name, "")
             known = words.get(option.name)
             if known is None:
-                default_text = f" Default: {_default_text(default)}." if default not in (None, "", False) else ""
+                shown = " ".join(cast(tuple[str, ...], default)) if isinstance(default, tuple) else default
+                default_text = f" Default: {shown}." if default not in (None, "", False) else ""
                 words[option.name] = Option(optional_type(hints[option.name]), help_text + default_text, (cls,))
             else:
                 words[option.name] = Option(known.hint, known.help, (*known.parts, cls))
     return words
-
-
-def _default_text(default: object) -> str:
-    return " ".join(map(str, cast(tuple[object, ...], default))) if isinstance(default, tuple) else str(default)
 
 
 def optional_type(hint: Any) -> Any:
@@ -153,12 +150,15 @@ def run_config(
     _refuse_meaningless(given, mode, "robot" if map_cls is RobotArm else figure, replay)
     chosen = {"mode": mode, "map": map, "replay": replay}
     options = _GivenOptions(given, " ".join(f"--{name} {value}" for name, value in chosen.items() if value))
+    hand = options.of(User)
+    if isinstance(hand.get("person"), str):
+        hand["person"] = persona(hand["person"])
     mode_part = mode_cls(**options.added(mode_cls), **options.of(mode_cls))
     around = {"around": Circle(**options.of(Circle))} if "around" in _field_names(map_cls) else {}
     config = RunConfig(
         mode=mode_part,  # pyright: ignore[reportArgumentType]
         map=map_cls(**options.of(map_cls), **around),  # pyright: ignore[reportArgumentType]
-        user=User(does=user or "relaxed", **_resolve_person(options.of(User))),  # pyright: ignore[reportArgumentType]
+        user=User(does=user or "relaxed", **hand),  # pyright: ignore[reportArgumentType]
         figure=Figure(kind=figure, **options.of(Figure)),  # pyright: ignore[reportArgumentType]
         device=Replay(replay) if replay else Phantom(**options.of(Phantom)), clock=Clock(**options.of(Clock)),
         **options.of(RunConfig, ("seconds", "seed")),
@@ -192,12 +192,6 @@ def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, repla
 
 def _unknown_option(option: str) -> ParameterError:
     return ParameterError(f"{option} is not known; there are {', '.join(sorted(VOCABULARY))}")
-
-
-def _resolve_person(words: dict[str, Any]) -> dict[str, Any]:
-    """Options of a user, with the person in place of a person's name."""
-    named = words.get("person")
-    return words | {"person": persona(named)} if isinstance(named, str) else words
 
 
 def _part_of_kind(what: str, name: str, parts: tuple[type, ...]) -> Any:

@@ -176,11 +176,12 @@ def validation_message(error: ValidationError, cls: type) -> str:
     place, kind, context = first["loc"], first["type"], first.get("ctx", {})
     names = [str(name) for name in place if not isinstance(name, int)]
     option = "--" + names[-1].replace("_", "-") if names else cls.__name__
-    unit = _unit_text(cls, place)
+    field = _field_at(cls, place)
+    unit = "" if field is None else (field.json_schema_extra or {}).get("unit", "")
+    unit = f" {unit}" if unit else ""
     finite = ", and finite"
     if kind in ("greater_than_equal", "greater_than", "finite_number"):
         least = context.get("ge", context.get("gt"))
-        field = _field_at(cls, place)
         if least is None and field is not None:
             least = next((getattr(m, a) for m in field.metadata for a in ("ge", "gt") if hasattr(m, a)), None)
         exclusive = kind == "greater_than" or (field is not None and any(hasattr(m, "gt") for m in field.metadata))
@@ -234,9 +235,3 @@ def _part_at(cls: type, place: Sequence[str | int]) -> type:
         members = [m for m in get_args(cls) if m is not type(None)]
         cls = members[0] if len(members) == 1 else cls
     return cls
-
-
-def _unit_text(cls: type, place: Sequence[str | int]) -> str:
-    field = _field_at(cls, place)
-    unit = (field.json_schema_extra or {}).get("unit", "") if field is not None else ""
-    return f" {unit}" if unit else ""

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from experiments.files.atomic_file import atomic_file
 from geometry.arrays import Array
+from sim.compilation.whole_files import read_hashed, write_hashed
 
 
 def cached_array(
@@ -42,7 +42,7 @@ def cached_array(
         return cached
     found = np.ascontiguousarray(find(), dtype=np.float64)
     with suppress(OSError):
-        _write(path, _digest([found.ravel()]) + found.tobytes())
+        write_hashed(path, found.tobytes())
     return found
 
 
@@ -51,23 +51,16 @@ def is_cached(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]
     return _read(_cache_file(folder, name, made_of), shape) is not None
 
 
-_DIGEST_SIZE = hashlib.sha256().digest_size
-
-
 def _cache_file(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
     return folder / f"{name}-{_digest(made_of).hex()}.kept"
 
 
 def _read(path: Path, shape: tuple[int, ...]) -> Array | None:
-    try:
-        content = path.read_bytes()
-    except OSError:
+    content = read_hashed(path)
+    if content is None:
         return None
-    rows, rest = divmod(len(content) - _DIGEST_SIZE, 8 * int(np.prod(shape[1:])))
-    if rest or rows < 0 or shape[0] not in (-1, rows):
-        return None
-    values = np.frombuffer(content[_DIGEST_SIZE:])
-    return values.reshape(shape).copy() if _digest([values]) == content[:_DIGEST_SIZE] else None
+    rows, rest = divmod(len(content), 8 * int(np.prod(shape[1:])))
+    return None if rest or shape[0] not in (-1, rows) else np.frombuffer(content).reshape(shape).copy()
 
 
 def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
@@ -76,10 +69,3 @@ def _digest(arrays: Iterable[npt.NDArray[np.generic]]) -> bytes:
         digest.update(f"{array.dtype} {array.shape}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.digest()
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write a file atomically, also when two processes write it at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(path) as file:
-        file.write(content)

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
-from experiments.files.atomic_file import atomic_file
 from experiments.files.json_text import json_text
 from models.phantom.parameters import PREMIUM_1_5
+from sim.compilation.whole_files import atomic_file
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, IdentificationResult
@@ -30,15 +30,7 @@ _MAX_TORQUE = max(PREMIUM_1_5.peak_torque)
 
 
 class Calibration(NamedTuple):
-    """The device to which the encoder zero of a device file belongs.
-
-    Attributes
-    ----------
-    name, serial : str
-        Name and serial number of the device.
-    power_up : int
-        See `sim.devices.driver.DeviceIdentity`.
-    """
+    """Name, serial number and `power_up` of the device to which the encoder zero of a device file belongs."""
 
     name: str
     serial: str

@@ -12,18 +12,14 @@ from controllers.errors import ControllerError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.files.atomic_file import atomic_file
 from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
+from sim.compilation.whole_files import atomic_file
 from sim.errors import SimError
 
 VERSION = 1
-_KINDS = {
-    "Cylindrical": Cylindrical.from_arrays,
-    "Composite": Composite.from_arrays,
-    "Lifted": Lifted.from_arrays,
-}
+_KINDS = {"Cylindrical": Cylindrical.from_arrays, "Composite": Composite.from_arrays, "Lifted": Lifted.from_arrays}
 
 
 def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:

@@ -7,12 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from controllers.certificates.flight.ballistic import (
-    BodyMotion,
-    FlightJudgement,
-    ballistic_verdict,
-    judge_flights,
-)
+from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement, ballistic_verdict, judge_flights
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
 from controllers.certificates.flight.flight_fit import FlightFit, find_flights, fit_free_fall
 from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
@@ -107,12 +102,6 @@ class FlightTrial(NamedTuple):
     residual: float
 
 
-def body_motion(clip: Clip) -> BodyMotion:
-    """Centre of mass, momentum and contacts of a clip on the default figure, for the ballistic certificate."""
-    dynamics, floor = momentum(clip), contacts(clip)
-    return BodyMotion(clip.fps, *dynamics, floor.clearance, floor.supported)
-
-
 def body_contact(clip: Clip) -> BodyContact:
     """Floor contact and foot skate of a clip, for the certificate's checks of the capture."""
     floor, points = contacts(clip), sole_points(clip.poses)
@@ -149,16 +138,15 @@ def _is_in_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
 
 
 def clip_ballistics(
-    clip: Clip,
-    judging: JudgementCriteria = DEFAULT_CRITERIA,
-    assumptions: tuple[str, ...] = (),
+    clip: Clip, judging: JudgementCriteria = DEFAULT_CRITERIA, assumptions: tuple[str, ...] = ()
 ) -> ClipBallistics:
     """Certify the flights of a clip, and that friction suffices for its turns outside flights.
 
     `assumptions` are added to those of the verdict on the flights.
     """
     laps = _with_second_lap(clip)
-    motion = body_motion(laps)
+    floor = contacts(laps)
+    motion = BodyMotion(laps.fps, *momentum(laps), floor.clearance, floor.supported)
     judgements = judge_flights(motion, judging.tolerance)
     flights = tuple(flight for flight in judgements if _is_in_first_lap(flight.fit.start, clip, motion.supported))
     bounds = rate_bounds(motion, flights, judging.friction)

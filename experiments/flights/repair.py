@@ -6,19 +6,63 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.optimize import root
+from scipy.spatial.transform import Rotation
 
 from controllers.certificates.flight.repair import RepairPlan, RepairTask, repair
 from experiments.flights.ballistics import ClipBallistics, clip_ballistics
-from experiments.flights.conserved_momentum import with_constant_momentum
+from geometry import quaternions
 from geometry.arrays import Array, Mask
 from geometry.physics import GRAVITY
 from models.mocap.dynamics.contacts import contacts
-from models.mocap.dynamics.momentum import momentum
+from models.mocap.dynamics.momentum import Momentum, momentum
 from models.mocap.dynamics.moved_legs import displaced_with_planted_feet, hip_to_ankle
 from models.mocap.library import check_target, load_clip, writing
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
+
+ROUNDS = 4  # iterations, since momentum by finite differences also depends on the rotations of neighbouring frames
+
+
+def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
+    """The clip with constant angular momentum in flights (first frame, last frame), and unchanged centres of mass.
+
+    A flight for which there is no solution is left as it is.
+    """
+    poses = clip.poses.copy()
+    for _ in range(ROUNDS):
+        dynamics = momentum(Clip(poses, clip.fps, clip.name))
+        for start, end in flights:
+            rotations = _flight_rotations(dynamics, start, end, 1.0 / clip.fps)
+            if rotations is not None:
+                span, q = slice(start, end + 1), rotations.as_quat(scalar_first=True)
+                com = dynamics.com[span]
+                poses[span, :3] = com + quaternions.rotated(q, poses[span, :3] - com)
+                poses[span, 3:7] = quaternions.product(q, poses[span, 3:7])
+    return Clip(poses, clip.fps, clip.name)
+
+
+def _flight_rotations(dynamics: Momentum, start: int, end: int, step: float) -> Rotation | None:
+    """R of each frame of a flight; None if no momentum gives R = 1 at the last frame."""
+    # Momentum and inertia at the midpoints between frames.
+    angular = 0.5 * (dynamics.angular[start:end] + dynamics.angular[start + 1 : end + 1])
+    angular[0], angular[-1] = dynamics.angular[start + 1], dynamics.angular[end - 1]
+    inertia = 0.5 * (dynamics.inertia[start:end] + dynamics.inertia[start + 1 : end + 1])
+
+    def rotations_for(mean: Array) -> list[Rotation]:
+        R = [Rotation.identity()]
+        for frame_angular, frame_inertia in zip(angular, inertia, strict=True):
+            missing = R[-1].inv().apply(mean) - frame_angular
+            R.append(R[-1] * Rotation.from_rotvec(np.linalg.solve(frame_inertia, missing) * step))
+        return R
+
+    def landing_rotation(mean: Array) -> Array:
+        return rotations_for(mean)[-1].as_rotvec()
+
+    found = root(landing_rotation, angular.mean(axis=0), tol=1e-10)
+    return Rotation.concatenate(rotations_for(np.asarray(found.x))) if found.success else None
+
 
 _CHANGE_MARGIN = 1.0  # time before the first refuted flight and after the last one that may be changed [s]
 _PENETRATION_TOLERANCE = 0.01  # floor penetration of captures that is tolerated [m]

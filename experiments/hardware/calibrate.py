@@ -49,7 +49,9 @@ def calibrate(options: CalibrateHardware) -> int:
         readings = still_readings(driver, options.seconds)
     finally:
         driver.close()
-    offset, margin = zero_of(readings, np.array(options.pose))
+    offset = readings.mean(axis=0) - np.array(options.pose)
+    # Half an encoder count, or half the range of the readings if that is larger.
+    margin = 0.5 * np.maximum(np.array(ENCODER_STEP), np.ptp(readings, axis=0))
     content = calibrated_json(offset.tolist(), margin.tolist(), driver.identity, base)
     save_device(content, options.out)
     if options.json:
@@ -60,15 +62,6 @@ def calibrate(options: CalibrateHardware) -> int:
     device = f"{driver.identity.name} {driver.identity.serial}".rstrip()
     print(f"{device}: {len(readings)} readings; in {options.out}.")
     return 0
-
-
-def zero_of(readings: Array, pose: Array) -> tuple[Array, Array]:
-    """Offset of mean readings (n, 3) from the pose (3,), and its margin [rad], shapes (3,).
-
-    The margin is half an encoder count, or half the range of the readings if that is larger.
-    """
-    margin = 0.5 * np.maximum(np.array(ENCODER_STEP), np.ptp(readings, axis=0))
-    return readings.mean(axis=0) - pose, margin
 
 
 def still_readings(driver: Driver, seconds: float) -> Array:

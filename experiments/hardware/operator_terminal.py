@@ -17,7 +17,7 @@ from controllers.safety.arming import ARM, CLEAR, DISARM, State
 from controllers.safety.faults import Fault
 from experiments.hardware.link import link_now
 from experiments.hardware.run_options import RunHardware
-from sim.hardware.controls import HardwareRun, RecorderStatus, RunStatus
+from sim.hardware.controls import HardwareRun, RunStatus
 
 _POLL_INTERVAL = 0.05  # [s] between two polls, each of which is also the heartbeat of the controls
 _DISARMED_TEXT = "Disarmed: the motors are off."
@@ -52,7 +52,9 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
                 return status
             if status.recorded is not None and not status.recorded.alive and was_recording:
                 was_recording = False
-                console.print(_recording_ended(status.recorded), highlight=False)
+                reason = f" ({os.strerror(status.recorded.error)})" if status.recorded.error else ""
+                rows = f"after {status.recorded.rows} ticks; they are kept, and the run goes on."
+                console.print(f"The recording has ended{reason} {rows}", highlight=False)
             if status.state is not state:
                 state = status.state
                 console.print(_status_line(status, options.dead_man, terminal), highlight=False)
@@ -67,11 +69,6 @@ def attend(run: HardwareRun, seconds: float, options: RunHardware, console: Cons
                 end_time = end_time or time.monotonic() + seconds
     run.request(DISARM)
     return status
-
-
-def _recording_ended(recorded: RecorderStatus) -> str:
-    reason = f" ({os.strerror(recorded.error)})" if recorded.error else ""
-    return f"The recording has ended{reason} after {recorded.rows} ticks; they are kept, and the run goes on."
 
 
 def _handle_enter(run: HardwareRun, status: RunStatus) -> bool:

@@ -120,19 +120,13 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
     """The outcome of a run that has ended."""
     found = _summarize_recording(recording)
     return Outcome(
-        device=ready.identity.name,
-        transport=ready.identity.transport,
-        fault="" if last.fault is Fault.NONE else last.fault_text,
-        silent=ended is None,
-        broken=ended.broken if ended else "",
-        ticks=ended.ticks if ended else int(last.row["tick"]),
-        missed=ended.missed if ended else int(last.row["missed"]),
-        compute=ended.compute[:3] if ended else None,
-        lateness=ended.lateness[:3] if ended else None,
-        memory_growth=ended.memory_growth if ended else None,
-        descriptors=ended.descriptors if ended else None,
-        **found,
-    )
+        device=ready.identity.name, transport=ready.identity.transport,
+        fault="" if last.fault is Fault.NONE else last.fault_text, silent=ended is None,
+        broken=ended.broken if ended else "", ticks=ended.ticks if ended else int(last.row["tick"]),
+        missed=ended.missed if ended else int(last.row["missed"]), compute=ended.compute[:3] if ended else None,
+        lateness=ended.lateness[:3] if ended else None, memory_growth=ended.memory_growth if ended else None,
+        descriptors=ended.descriptors if ended else None, **found,
+    )  # fmt: skip
 
 
 def holds_ticks(path: Path) -> bool:

@@ -21,9 +21,8 @@ from sim.hardware.process_start import parent_id
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
 from sim.reference.reference import poses_along
-from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 from sim.world.shown_phantom import show_angles, shown_phantom
 
 _POLL_INTERVAL = 1.0 / 60.0  # [s] between two polls: half the time between two images

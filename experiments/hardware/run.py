@@ -7,7 +7,6 @@ import sys
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -92,13 +91,9 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     session = _compile_session(config, options, console)
     job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene)
     make = MakeServo(
-        served(config),
-        options.name,
-        _gate(config, options),
-        linkage_from(content).offset,
-        calibration_from(content),
+        served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content),
         silent=options.silence,
-    )
+    )  # fmt: skip
     with run_folder(options) as begin, contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             make_device = MakeEmulated(scene, start_of(session), emulated_linkage)
@@ -109,7 +104,10 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         ready = run.start()
         warnings = check_device(ready.identity, make.calibration, "inertia" in content)
         begin()
-        _write_inputs(config, content, options.out)
+        # Only once the servo ticks, since a program that is killed earlier would leave them behind.
+        (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+        if content:
+            save_device(content, options.out / DEVICE)
         for line in (*warnings, *ready.said):
             console.print(line, highlight=False)
         if options.view:
@@ -129,13 +127,6 @@ def _compile_session(config: RunConfig, options: RunHardware, console: Console) 
     for remark in session.remarks:
         console.print(remark, highlight=False)
     return session
-
-
-def _write_inputs(config: RunConfig, content: dict[str, Any], out: Path) -> None:
-    """Write configuration and device file; only once the servo ticks, since a killed program would leave them."""
-    (out / CONFIG).write_text(to_json(config), encoding="utf-8")
-    if content:
-        save_device(content, out / DEVICE)
 
 
 @contextlib.contextmanager

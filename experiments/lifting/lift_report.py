@@ -1,16 +1,22 @@
-"""The report of a lifted map: its curves, transitions and in-betweens, in words and as data."""
+"""Lifting of clips into a file, and its report: curves, transitions and in-betweens, in words and as data."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from controllers.checks import check_kind
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
+from controllers.haptic_map.lifting.room import Room
+from experiments.config.maps import MAP_SUFFIX
+from experiments.files.given_path import given_path
+from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable
 from experiments.fitting.verdict import MAX_FOOT_SKATE, MAX_JOINT_EXCESS, MAX_PENETRATION
-from experiments.lifting.lift import LiftedClips
-from experiments.lifting.map_quality import MapQuality, measure_map
-from experiments.lifting.motion_measure import MotionMeasure
+from experiments.lifting.lift import LiftedClips, lift_clips
+from experiments.lifting.map_quality import MapQuality, MotionMeasure, measure_map
+from sim.errors import SimError
 
 
 class LiftReport(NamedTuple):
@@ -148,3 +154,53 @@ def _arrangement_data(measure: ArrangementMeasure) -> dict[str, object]:
 def report_lift(lifted: LiftedClips, seed: int) -> LiftReport:
     """Measure a lifted map."""
     return LiftReport(lifted, measure_map(lifted.layout(), lifted.clips, np.random.default_rng(seed)))
+
+
+_DEFAULT_ROOM = Room()
+
+
+def lift_into(
+    names: Sequence[str | Path], out: str | Path, *, room: Room = _DEFAULT_ROOM, cyclic: Sequence[str | Path] = (),
+    seed: int = 1, overwrite: bool = False, raw: bool = False,
+) -> LiftReport:  # fmt: skip
+    """Lift clips: a curve for each, and one haptic map with all of them, which is measured and written to a file.
+
+    Parameters
+    ----------
+    names : sequence of str or path
+        Names of embedded clips, or motion files, which are prepared.
+    out : path
+        File to write (.npz); it is written last.
+    room : Room
+        Where the curves may lie.
+    cyclic : sequence of str or path
+        Those of `names` that must be closed; of the others, clips that close are closed.
+    seed : int
+        Seed of the initial arrangement of the curves.
+    overwrite : bool
+        Replace an existing file.
+    raw : bool
+        Take motion files as captured, not prepared.
+
+    Raises
+    ------
+    ModelError, ControllerError, SimError
+        As `lift_clips`; or if an argument is of the wrong kind, or the file is not a .npz or exists and is not to be
+        replaced.
+    OSError
+        If it cannot be written.
+    """
+    for name, value, kind in (
+        ("names", names, Sequence[str | Path]), ("room", room, Room), ("cyclic", cyclic, Sequence[str | Path]),
+        ("seed", seed, int), ("overwrite", overwrite, bool), ("raw", raw, bool),
+    ):  # fmt: skip
+        check_kind(name, value, kind)
+    out, clips = given_path("out", out), tuple(map(str, names))
+    if out.suffix != MAP_SUFFIX:
+        raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
+    if out.exists() and not overwrite:
+        raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
+    report = report_lift(lift_clips(clips, room, tuple(map(str, cyclic)), seed, raw), seed)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_map(report.lifted.haptic_map, out)
+    return report

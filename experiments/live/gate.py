@@ -25,15 +25,7 @@ _DENIED = (
 
 
 class Request(NamedTuple):
-    """The head of a request.
-
-    Attributes
-    ----------
-    path : str
-        Path with its query.
-    headers : dict
-        Header values by name in lower case.
-    """
+    """The head of a request: path with its query, and values of the headers by name in lower case."""
 
     path: str
     headers: dict[str, str]

@@ -17,14 +17,12 @@ from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import open_cap_hand
 from experiments.live.driver import Driver
-from experiments.live.panels.clock_panel import ClockPanel
+from experiments.live.panels.clock_panel import ClockPanel, add_hand_keys
 from experiments.live.panels.gains_panel import GainsPanel
-from experiments.live.panels.hand_keys import add_hand_keys
 from experiments.live.panels.plots import Plots
-from experiments.live.panels.run_panel import RunPanel
+from experiments.live.panels.run_panel import RunPanel, UploadsPanel
 from experiments.live.panels.status import FIRST_STEPS, status_html
 from experiments.live.panels.takes_panel import TakesPanel
-from experiments.live.panels.uploads_panel import UploadsPanel
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
 from geometry.arrays import Array
@@ -32,10 +30,9 @@ from models.errors import ModelError
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
 from sim.errors import SimError
-from sim.viewer.courses import courses
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 
@@ -243,17 +240,8 @@ class Page:
         self.pictures += 1
         nq = stage.configuration_size
         with self.server.atomic():
-            stage.show(
-                Moment(
-                    float(now["t"][0]),
-                    now["qpos"][:nq],
-                    now["ghost"],
-                    now["p"],
-                    now["force"],
-                    now["user"],
-                    now["target"],
-                )
-            )
+            shown = (now[name] for name in ("ghost", "p", "force", "user", "target"))
+            stage.show(Moment(float(now["t"][0]), now["qpos"][:nq], *shown))
             if now["curve"][0] != self._drawn_curve and desk.built is not None and desk.built.bends:
                 self._drawn_curve = now["curve"][0]
                 stage.draw_course(0, now["course"].reshape(COURSE_POINTS, 3))

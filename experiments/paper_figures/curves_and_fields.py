@@ -11,15 +11,7 @@ from controllers.fields.edited import Edited, performance
 from controllers.fields.river import River, integrate
 from experiments.config.modes import Follow
 from experiments.paper_figures.silhouettes import Silhouettes
-from experiments.paper_figures.sources import (
-    CYLINDER,
-    MILLIMETRES,
-    curve_of,
-    poses_at,
-    pushed_lap,
-    recording_in,
-    ticks,
-)
+from experiments.paper_figures.sources import CYLINDER, MILLIMETRES, curve_of, poses_at, pushed_lap, recording_in, ticks
 from experiments.paper_figures.space import arrows, path, workspace
 from experiments.results.folder import config_of
 from experiments.results.pages.figures import PALE_TUBE

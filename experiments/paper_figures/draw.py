@@ -11,11 +11,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from experiments.files.html_page import html_page
-from experiments.paper_figures.crossing import crossing_rivers
+from experiments.paper_figures.bent_and_crossing import crossing_rivers, rendered_result, stretching
 from experiments.paper_figures.curves_and_fields import field_and_map, trajectory_and_vectors, v_plus_u
 from experiments.paper_figures.cylinder import four_motion_cylinder, red_and_blue_inputs
 from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRETCH, configs, recording_in
-from experiments.paper_figures.stretching import rendered_result, stretching
 from experiments.results.pages.figures import STYLE
 from experiments.runs.run import run
 from sim.errors import SimError

@@ -18,19 +18,7 @@ _N_CORNERS = 28  # of an outline
 
 
 class Outline(NamedTuple):
-    """Projected outline of a geom.
-
-    Attributes
-    ----------
-    body : str
-        Body of the geom.
-    rgba : array (4,)
-        Colour in the model.
-    depth : float
-        Depth of its centre, away from the viewer [m].
-    corners : array (n, 2)
-        Corners: to the right, and up [m].
-    """
+    """Outline of a geom: its body, colour in the model (4,), depth from the viewer and corners (n, 2) [m]."""
 
     body: str
     rgba: Array
@@ -74,13 +62,13 @@ class Silhouettes:
 
     def draw(
         self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
-        paint: Paint = lambda body, rgba: tuple(rgba), zorder: float = 3.0,
+        paint: Paint = lambda body, rgba: tuple(rgba),
     ) -> None:  # fmt: skip
         """Draw a pose with its root above a point of the axes, with `scale` units of the axes per metre."""
         for outline in self.outlines(pose, azimuth):
             color = paint(outline.body, outline.rgba)
             corners = np.asarray(at) + scale * outline.corners
-            ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=zorder))
+            ax.add_patch(Polygon(corners, facecolor=color, edgecolor="white", linewidth=0.25, zorder=3.0))
 
 
 def _circle() -> Array:

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -24,16 +25,11 @@ def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0
     for axis in (ax.xaxis, ax.yaxis, ax.zaxis):
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis._axinfo["grid"].update(color="#e6e8ec", linewidth=0.6)
-        axis.set_major_locator(_tick_locator(float(np.max(high - low))))
+        extent = float(np.max(high - low))
+        axis.set_major_locator(MultipleLocator(10.0 if extent < 60.0 else 25.0 if extent < 150.0 else 50.0))
         axis.labelpad = 2.0
     ax.tick_params(pad=0.0, labelsize=7.5)
     return ax
-
-
-def _tick_locator(extent: float) -> Any:
-    from matplotlib.ticker import MultipleLocator
-
-    return MultipleLocator(10.0 if extent < 60.0 else 25.0 if extent < 150.0 else 50.0)
 
 
 def arrows(ax: Axes3D, starts: Array, vectors: Array, color: str, label: str, width: float = 1.1) -> None:

@@ -1,6 +1,6 @@
 """Renders a film of a run from its recording: the workspace beside the stage, frame by frame."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -211,7 +211,9 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
         gif_file = gif_target and files.enter_context(
             FilmFile(gif_target, film.width // 2, film.height // 2, film.fps / 2.0)
         )
-        for row in _with_progress(range(len(frames)), console):
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
+        bar = files.enter_context(Progress(*columns, TimeRemainingColumn(), console=console))
+        for row in bar.track(range(len(frames)), description="drawing"):
             picture = frames.frame(row)
             film_file.add(picture)
             if gif_file and row % 2 == 0:
@@ -222,10 +224,3 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
     console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
     clearance = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
     return FilmResult(tuple(map(str, targets)), len(frames), clearance)
-
-
-def _with_progress(rows: range, console: Console) -> Iterator[int]:
-    """Yield rows, with a progress bar that shows the remaining time."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("frames"))
-    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
-        yield from bar.track(rows, description="drawing")

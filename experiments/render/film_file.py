@@ -93,11 +93,5 @@ def _encoder(file: Path, width: int, height: int, fps: float) -> Generator[None,
             macro_block_size=1, output_params=["-filter_complex", _PALETTE, "-loop", "0"],
         )  # fmt: skip
     return write(
-        str(file),
-        (width, height),
-        fps=fps,
-        codec="libx264",
-        quality=None,
-        macro_block_size=1,
-        output_params=_OPTIONS,
+        str(file), (width, height), fps=fps, codec="libx264", quality=None, macro_block_size=1, output_params=_OPTIONS
     )

@@ -71,17 +71,7 @@ def _backend_failure(backend: str) -> str:
 
 
 class View(NamedTuple):
-    """Camera pose.
-
-    Attributes
-    ----------
-    lookat : tuple of float
-        Point in the middle of the picture, in W [m].
-    distance : float
-        Distance of the camera from this point [m].
-    azimuth, elevation : float
-        Viewing direction [degrees]: azimuth 0 along +x, 90 along +y; elevation negative downwards.
-    """
+    """Camera pose: target in W and distance from it [m], azimuth from +x to +y and elevation upwards [degrees]."""
 
     lookat: tuple[float, float, float]
     distance: float

@@ -15,10 +15,10 @@ from models.humanoid.skeleton import N_POSE, figure_spec
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, P_WH, ROBOT, SceneConfig, device_spec, robot_spec, world_spec
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, TUBE, rgb
 from sim.viewer.replay_html import drawn_tube
 from sim.viewer.shapes import tube
+from sim.viewer.shown import courses
 
 Rgba = tuple[float, float, float, float]
 

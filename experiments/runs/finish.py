@@ -7,12 +7,11 @@ from rich.console import Console
 from experiments.console.compiling import compiler
 from experiments.results.folder import RECORDING, SUMMARY, clips_of, config_of, locked_folder
 from experiments.results.measures.summary_parts import SpeedSummary
-from experiments.results.pages.report_of import lines_of, write_report_of
+from experiments.results.pages.report import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import session_summary, write_animations, write_summary
 from experiments.setups.wiring import wire
-from sim.loop.loop import Loop
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import Loop, peak_memory_mb
 from sim.recording.recording import Recording
 
 

@@ -1,32 +1,34 @@
 """Haptic maps as objects, from which a simulation makes the map of its figure or robot arm."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
+from mujoco import MjModel
 
 from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted as LiftedMap
 from experiments.config.keywords import with_keyword_messages
-from experiments.config.maps import MapFile
+from experiments.config.maps import Circle, MapFile
 from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
-from experiments.setups.maps.about_circle import check_clips
-from experiments.setups.maps.composite import PARTS, composite_parts
-from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
+from experiments.setups.maps.about_circle import Place, check_clips
+from experiments.setups.maps.cylindrical import CORNERS, PARTS, composite_parts, cylindrical_parts
 from experiments.setups.maps.map_file import lifted_parts
-from experiments.setups.maps.of_stature import for_size_of
-from experiments.setups.maps.place import Place
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
+from experiments.setups.setups import for_size_of
+from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 from sim.world.world import World
@@ -46,6 +48,8 @@ class _AboutCurve:
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
+    made: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
+    """Makes the map's parts for a figure."""
 
     clips: Sequence[Clip]
     around: Trajectory = field(repr=False)
@@ -62,6 +66,10 @@ class _AboutCurve:
 
     def __repr__(self) -> str:
         return short_text(self)
+
+    def parts(self, world: World) -> ClipMapParts:
+        """What the map gives a run."""
+        return for_size_of(world.body, lambda model: self.made(tuple(self.clips), model, self._place()))
 
     def _place(self) -> Place:
         curve = check_reach(self.around)
@@ -92,11 +100,7 @@ class Cylindrical(_AboutCurve):
         If the Phantom does not reach the curve.
     """
 
-    most = CORNERS
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: cylindrical_parts(tuple(self.clips), self._place(), model))
+    most, made = CORNERS, staticmethod(cylindrical_parts)
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,11 +120,7 @@ class Composite(_AboutCurve):
         As `Cylindrical`, of three clips.
     """
 
-    most = PARTS
-
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: composite_parts(tuple(self.clips), self._place(), model))
+    most, made = PARTS, staticmethod(composite_parts)
 
 
 @dataclass(frozen=True)
@@ -222,3 +222,29 @@ class RobotArm:
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
         return arm_parts(world.body, self.around, self.reach, self.scale)
+
+
+_N_COMPARED = 5  # phases of a lap at which a user-defined derivative is checked: few symmetries of a map share all five
+
+
+def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
+    """Map parts of a user-defined map about a curve, without clips.
+
+    Raises
+    ------
+    ParameterError
+        If its poses are not poses of the figure, or its derivative is not that of its poses.
+    """
+    if haptic_map.nq != N_POSE:
+        name = type(haptic_map).__name__
+        raise ParameterError(f"poses of {name} have {haptic_map.nq} numbers; the figure's have {N_POSE}")
+
+    haptic_map.check_jacobian(curve.point(np.linspace(curve.start, curve.end, _N_COMPARED, endpoint=False)))
+
+    def none(*_: object) -> Any:
+        raise ParameterError("a user-defined map has no rivers; expected another field")
+
+    return ClipMapParts(
+        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=check_reach(curve), reach=Circle().radius, rivers=none,
+        river_pushes=none, course=lambda damping, stiffness: curve,
+    )  # fmt: skip

@@ -3,13 +3,13 @@
 import time
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from rich.console import Console
 
-from controllers.curves.trajectory import Trajectory
 from controllers.state import HAND_TIME, POSITION
 from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
@@ -32,21 +32,19 @@ from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.summary import RunSummary
 from experiments.results.measures.summary_parts import SpeedSummary
-from experiments.setups.default_animation import default_poses
 from experiments.setups.parts.part_types import Measuring
-from experiments.setups.session import Session
+from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from sim.loop.channels import groups, record_into, shown_configuration
-from sim.loop.clock import RealTime
-from sim.loop.loop import BLOCK_SECONDS, Loop
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
-from sim.viewer.page import NullPage, Page
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, RealTime, courses
+
+if TYPE_CHECKING:
+    from sim.viewer.live_page import LivePage
 
 BVH_FPS = 50.0  # [1/s]
 VIEW_BLOCK_SECONDS = 0.032  # simulated time between two updates of the live view
@@ -88,7 +86,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
-        from experiments.results.pages.report_of import write_report_of  # matplotlib and viser: after the first tick
+        from experiments.results.pages.report import write_report_of  # matplotlib and viser: after the first tick
 
         write_report_of(out)
     others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())
@@ -139,11 +137,13 @@ def _simulate(
 ) -> SpeedSummary:
     servo = session.servo
     record = record_into(recorder, servo, session.world)
-    page = _live_page(session) if view else NullPage()
+    page = _live_page(session) if view else None
     clock, simulated = RealTime(), session.world.simulates_figure
 
     def observe(ticks: TickLog, frames: FrameLog, n: int) -> None:
         record(ticks, frames, n)
+        if page is None:
+            return
         hand = ticks.hand[n - 1]
         page.show(
             Moment(
@@ -171,12 +171,13 @@ def _simulate(
 
         with session.naming_laws():
             times = loop.run(rest, progress)
-    page.close()
+    if page is not None:
+        page.close()
     store_duration(SIMULATING, 1.0 / times.real_time_factor)
     return SpeedSummary(times.real_time_factor, first_tick, peak_memory_mb())
 
 
-def _live_page(session: Session) -> Page:
+def _live_page(session: Session) -> "LivePage":
     from sim.viewer.live_page import LivePage  # importing viser takes a third of a second, and is rarely needed
 
     static = session.static()
@@ -188,15 +189,13 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
     """Summary of a session that has been run, computed from its recording."""
     parts = session.parts
 
-    def keep_curve(curve: Trajectory) -> None:
-        save_curve(curve, out / CURVE_FILE)
-
     with Recording(out / RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
         field = session.servo.field
         of = Measuring(
-            recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state, keep_curve
-        )
+            recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state,
+            partial(save_curve, path=out / CURVE_FILE),
+        )  # fmt: skip
         return parts.summarise(summary, of)
 
 

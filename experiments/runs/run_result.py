@@ -151,7 +151,7 @@ class Run:
 
     def report(self) -> Path:
         """Draw page and figures of the run; returns the page."""
-        from experiments.results.pages.report_of import write_report_of  # matplotlib takes long to import
+        from experiments.results.pages.report import write_report_of  # matplotlib takes long to import
 
         write_report_of(self.folder)
         return self.folder / REPORT

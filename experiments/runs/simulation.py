@@ -25,10 +25,9 @@ from experiments.config.run_config import REPLAY_WITH_USER, Clock, Figure, Phant
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
-from experiments.runs.map_objects import BodyMap, RobotArm
+from experiments.runs.map_objects import BodyMap, RobotArm, own_parts
 from experiments.runs.run_result import Run, check_record
 from experiments.runs.short_text import short_text
-from experiments.setups.maps.own_map import own_parts
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.devices import device_of
 from experiments.setups.parts.hands import TRACE_SAMPLE_TIME, intent_of, participant

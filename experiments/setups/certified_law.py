@@ -3,7 +3,6 @@
 Imports nothing but configurations, since certificates import it.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from controllers.fields.bunny import felt_bunny
@@ -14,17 +13,7 @@ from experiments.setups.parts.defaults import resolved, river_gains, tube_gains
 
 
 class CertifiedLaw(NamedTuple):
-    """A law of force that a run uses, with its gains.
-
-    Attributes
-    ----------
-    law : str
-        Name among `controllers.certificates.loop.laws.LAWS`.
-    stiffness, damping : float
-        [N/m], [N s/m].
-    width : float
-        ε or δ [m]; infinite if the law has none.
-    """
+    """A law of force, by its name in `laws.LAWS`, with its k_r [N/m], b_d [N s/m], and ε or δ [m], else infinite."""
 
     law: str
     stiffness: float
@@ -39,7 +28,28 @@ _UNBOUNDED = float("inf")
 
 def certified_laws(config: RunConfig) -> Laws:
     """The laws that a run uses."""
-    return _LAWS_BY_MODE[config.mode.kind](resolved(config).mode)
+    mode = resolved(config).mode
+    match mode:
+        case Follow():
+            law = "parallel" if mode.flow == "parallel" else "follow"
+            return {"": CertifiedLaw(law, mode.stiffness, mode.damping, mode.tube)}
+        case Bunny():  # near one that pulls along the curve, the field is that of FOLLOW to first order
+            k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
+            along = mode.bunny_attraction == "along"
+            return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _UNBOUNDED if along else width)}
+        case Rivers():
+            return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
+        case Lead():
+            return {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)}
+        case Stretch() | StretchThenFollow():  # tubes seek with the switch open, and hold with it closed
+            seek, damping = tube_gains(mode)
+            laws = {
+                "": CertifiedLaw("seek", seek, damping, _UNBOUNDED),
+                "_held": CertifiedLaw("hold", mode.rubber, damping, _UNBOUNDED),
+            }
+            if isinstance(mode, StretchThenFollow):  # on the curve as it was before bending
+                laws["_then"] = CertifiedLaw("follow", mode.stiffness, mode.damping, mode.tube)
+            return laws
 
 
 def leading_gains(config: RunConfig) -> tuple[float, float]:
@@ -75,43 +85,3 @@ def uncertified_parts(config: RunConfig) -> tuple[str, ...]:
     if isinstance(mode, Rivers) and mode.governor is not None:
         names.append("the gates of the rivers (--governor)")
     return tuple(names)
-
-
-def _follow_laws(mode: Follow | StretchThenFollow) -> Laws:
-    law = "parallel" if isinstance(mode, Follow) and mode.flow == "parallel" else "follow"
-    return {"": CertifiedLaw(law, mode.stiffness, mode.damping, mode.tube)}
-
-
-def _bunny_laws(mode: Bunny) -> Laws:
-    """Near a bunny that pulls along the curve, the field is that of FOLLOW to first order."""
-    along = mode.bunny_attraction == "along"
-    k_r, b_d, width = felt_bunny(mode.stiffness, mode.damping, mode.bunny_width, mode.bunny_attraction)
-    return {"": CertifiedLaw("follow" if along else "bunny", k_r, b_d, _UNBOUNDED if along else width)}
-
-
-def _river_laws(mode: Rivers) -> Laws:
-    return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
-
-
-def _stretch_laws(mode: Stretch | StretchThenFollow) -> Laws:
-    """Tubes seek with the switch open, and hold with it closed."""
-    seek, damping = tube_gains(mode)
-    return {
-        "": CertifiedLaw("seek", seek, damping, _UNBOUNDED),
-        "_held": CertifiedLaw("hold", mode.rubber, damping, _UNBOUNDED),
-    }
-
-
-def _stretch_then_follow_laws(mode: StretchThenFollow) -> Laws:
-    """As `_stretch_laws`, and FOLLOW on the curve as it was before bending."""
-    return _stretch_laws(mode) | {"_then": _follow_laws(mode)[""]}
-
-
-def _lead_laws(mode: Lead) -> Laws:
-    return {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)}
-
-
-_LAWS_BY_MODE: dict[str, Callable[..., Laws]] = {
-    "follow": _follow_laws, "bunny": _bunny_laws, "rivers": _river_laws, "stretch": _stretch_laws,
-    "stretch-then-follow": _stretch_then_follow_laws, "lead": _lead_laws,
-}  # fmt: skip

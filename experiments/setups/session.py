@@ -1,7 +1,7 @@
-"""A wired run: its parts, and the constant data that its recording keeps."""
+"""A wired run: its parts, the constant data that its recording keeps, and the animation of its unedited curve."""
 
 import math
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -10,10 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.algebra.law import Law
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.haptic_map.base import HapticMap
-from controllers.state import HandState
+from controllers.state import HandState, stylus_path
+from controllers.walking.walker import walker_at
+from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.devices import recorded_as
 from experiments.setups.parts.part_types import Parts, Settings
 from geometry.arrays import Array
@@ -23,6 +26,7 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import P_WH
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
+from sim.reference.reference import make_reference, map_poses, reference_along
 from sim.users.participant import Participant
 from sim.world.world import World
 
@@ -130,3 +134,37 @@ class Session:
     def body_pose(self, qpos: Array) -> Array:
         """The body's part of a recorded configuration: shape (75,), or (7,) of a robot arm; empty without a body."""
         return qpos[self.world.pose_at : self.world.pose_at + self.world.body.nq].copy()
+
+
+def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
+    """A function from nearest points (k, 3), phases (k,) and rivers (k,) to poses (k, 75) of the default animation.
+
+    It is called with rows in the order of time, `stride` figure updates apart.
+    """
+    if session.parts.maps.plays_rivers:
+        return _river_animation(session, stride)
+    haptic_map = session.haptic_map
+    memory = haptic_map.compiled().memory
+    if session.parts.walking is not None:
+        memory = walker_at.py_func(session.servo.field.walkers.state, 0).path.copy()
+
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
+        return map_poses(haptic_map, session.parts.argument_at(nearest, phases), memory)
+
+    return poses_at
+
+
+def _river_animation(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
+    """The same where each river plays its own clip, with the transitions between clips that the figure made."""
+    period = stride * session.servo.figure_ticks * session.servo.plant.period
+    compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.body
+    reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))
+
+    def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
+        traces = np.zeros((len(nearest), TRACE_SIZE))
+        traces[:, TRACE_PHASE], traces[:, TRACE_RIVER] = phases, rivers
+        poses = np.empty((len(nearest), session.haptic_map.nq))
+        reference_along(reference, stylus_path(nearest), traces, poses)
+        return poses
+
+    return poses_at

@@ -1,26 +1,27 @@
 """Registry of set-ups: the functions that make the parts of a run, by kind of mode and kind of map."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-import mujoco
+from mujoco import MjModel
 
-from experiments.config.maps import Led, Map, RobotArm
+from experiments.config.maps import Composite, Cylindrical, Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
-from experiments.setups.maps.composite import composite_setup
-from experiments.setups.maps.cylindrical import cylindrical_setup
+from experiments.fitting.blendable import longest_flight
+from experiments.setups.maps.about_circle import place_of
+from experiments.setups.maps.cylindrical import composite_parts, cylindrical_parts
 from experiments.setups.maps.map_file import map_file_setup
-from experiments.setups.maps.of_stature import for_size_of
 from experiments.setups.maps.river_clips import river_clips_setup
 from experiments.setups.maps.robot_arm import robot_arm_parts
-from experiments.setups.modes.bunny import bunny_parts
-from experiments.setups.modes.follow import follow_parts
+from experiments.setups.modes.fixed_curve import bunny_parts, flows_parallel, follow_parts
 from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import ClipMapParts, MapParts, Parts
+from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
@@ -33,9 +34,19 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
 }
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
+
+def _about_circle(made: Callable[..., ClipMapParts]) -> Callable[..., ClipMapParts]:
+    def setup(
+        config: RunConfig, part: Cylindrical | Composite, clips: tuple[Clip, ...], figure: MjModel
+    ) -> ClipMapParts:
+        return made(clips, figure, place_of(part), flows_parallel(config))
+
+    return setup
+
+
 MAP_SETUPS: dict[str, Callable[..., ClipMapParts]] = {
-    "cylindrical": cylindrical_setup,
-    "composite": composite_setup,
+    "cylindrical": _about_circle(cylindrical_parts),
+    "composite": _about_circle(composite_parts),
     "rivers": river_clips_setup,
     "file": map_file_setup,
 }
@@ -53,7 +64,7 @@ def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     return led_clips(part) if isinstance(part, Led) else load_clips(part.clips, part.raw)
 
 
-def map_parts(config: RunConfig, body: mujoco.MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
+def map_parts(config: RunConfig, body: MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:
     """Map parts of a configuration for a figure or a robot arm, with the given clips or else those that its map names.
 
     Raises
@@ -73,3 +84,22 @@ def map_parts(config: RunConfig, body: mujoco.MjModel, clips: tuple[Clip, ...] |
 def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:
     """Parts of a run: its mode's set-up applied to the map's parts."""
     return MODE_SETUPS[config.mode.kind](config, config.mode, maps)
+
+
+def for_size_of(figure: MjModel, made: Callable[[MjModel], ClipMapParts]) -> ClipMapParts:
+    """Map parts of a figure of any stature: made for the default stature, which is that of the clips, and scaled.
+
+    Lengths scaled by s at the same times scale accelerations by s, while gravity stays: a flight of the scaled motion
+    is ballistic at 1/√s of its own pace (equal Froude number, Alexander 1989, *Optimization and gaits in the locomotion
+    of vertebrates*, Physiol. Rev. 69, 1199-1227).
+    """
+    size = proportion(figure)
+    if size == 1.0:
+        return made(figure)
+    parts = made(figure_model())
+    flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
+    remark = (
+        f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "
+        f"a figure of {DEFAULT_STATURE * size:.2f} m falls so at {size**-0.5:.2f} of the clips' recorded speed"
+    )
+    return replace(parts, size=size, remarks=parts.remarks + ((remark,) if flying else ()))

@@ -6,6 +6,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numba import typeof, types
 
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
@@ -26,14 +27,23 @@ from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
 from models.one_blas_thread import on_one_blas_thread
 from models.phantom.kinematics import Quat
+from sim.body.drive import follow_units
+from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
-from sim.devices.device import first_reading, measure_in_motion
+from sim.devices.device import device_units, first_reading, measure_in_motion
 from sim.devices.simulated import simulated_phantom
-from sim.loop.run_units import run_units
-from sim.loop.servo import Servo, unlinked_field
+from sim.loop.loop import make_logs
+from sim.loop.servo import Servo, run_block, unlinked_field
 from sim.reference.floor_lowering import lower_start, lower_start_unit
-from sim.reference.map_derivative import derivative_unit, map_derivative
-from sim.reference.reference import along_unit, begin_in_motion, check_reference, poses_along
+from sim.reference.reference import (
+    along_unit,
+    begin_in_motion,
+    check_reference,
+    derivative_unit,
+    map_derivative,
+    poses_along,
+    poses_unit,
+)
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
 from sim.world.world import World
@@ -86,11 +96,7 @@ def wire(
 
 
 def wire_parts(
-    world: World,
-    maps: MapParts[Any],
-    parts_of: Callable[[Any], Parts],
-    ready: Ready,
-    device: DeviceOf | None = None,
+    world: World, maps: MapParts[Any], parts_of: Callable[[Any], Parts], ready: Ready, device: DeviceOf | None
 ) -> Session:
     """Wire a run from a world and the map's parts.
 
@@ -154,10 +160,20 @@ def check_seconds(settings: Settings, seconds: float) -> None:
 
 
 def _required_units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
-    """Compilation units that a run needs."""
-    lowers = parts.bends and parts.config.body != "robot"
-    more = ((derivative_unit(),) if parts.begins_in_motion else ()) + ((lower_start_unit(),) if lowers else ())
-    return run_units(servo, parts.program) + more + ((along_unit(servo.reference),) if parts.maps.plays_rivers else ())
+    """Compilation units of a run: loop over a servo, which need not be linked, with its kernels, start and end."""
+    ticks, frames = make_logs(servo, servo.figure_ticks)
+    loop = (typeof(servo), types.int64, types.int64, types.boolean, typeof(ticks), typeof(frames))
+    units = [
+        Unit.of(run_block, *loop),
+        *device_units(servo.device),
+        *follow_units(servo.figure, servo.reference),
+        *units_of_map(np.concatenate([servo.reference.stages, servo.field.maps.stages])),
+        *units_of_laws(parts.program),
+        poses_unit(),
+    ]
+    units += [derivative_unit()] * parts.begins_in_motion
+    units += [lower_start_unit()] * (parts.bends and parts.config.body != "robot")
+    return (*units, *([along_unit(servo.reference)] * parts.maps.plays_rivers))
 
 
 def _make_servo(parts: Parts, world: World, device_of: DeviceOf | None) -> Servo:

@@ -11,8 +11,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifting.room import Room
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import LiftedClips, lift_clips
-from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, measure_map
-from experiments.lifting.motion_measure import MotionMeasure
+from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, MotionMeasure, measure_map
 from models.humanoid.skeleton import figure_model
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 

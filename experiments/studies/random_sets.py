@@ -29,7 +29,7 @@ from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from geometry.arrays import Array, rms
 from models.errors import ModelError
 from models.mocap.motion.clip import Clip

@@ -15,7 +15,7 @@ import numpy as np
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from geometry.arrays import Array, rms
 from models.humanoid.skeleton import DEFAULT_MASS
 from models.mocap.library import embedded_names

@@ -3,7 +3,7 @@
 import hashlib
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,14 @@ from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.trial_table import TABLE_CSV, TABLE_PARQUET, trial_table, write_table
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import Trial, code_hash, plan_trials
-from experiments.trials.design.study_config import StudyConfig, parse_study, read_toml
+from experiments.trials.design.study_config import StudyConfig, StudyError, parse_study, read_toml
 from experiments.trials.execution.database import Database
-from experiments.trials.execution.drive import compile_and_make_maps, run_missing
+from experiments.trials.execution.drive import check_writable, compile_and_make_maps, run_missing
 from experiments.trials.execution.executors import executor
-from experiments.trials.execution.recordings_place import check_writable
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
-from experiments.trials.trial.run_trial import MAP_CACHE, Row
+from experiments.trials.trial.run_trial import Row
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -61,9 +59,8 @@ class StudyResult:
 
     def to_json(self) -> str:
         """Sentences, counts, contrasts and interactions as JSON."""
-        contrasts = [asdict(contrast) for contrast in self.found.contrasts]
         summary = {"sentences": self.sentences, "trials": len(self.table), "ran": self.ran, "failed": self.failed}
-        return json_text(summary | {"contrasts": contrasts, "interactions": self.found.interactions})
+        return json_text(summary | {"contrasts": self.found.contrasts, "interactions": self.found.interactions})
 
 
 @dataclass(frozen=True)
@@ -152,7 +149,7 @@ class Study:
         _check_folder(folder)
         with Database(folder / DATABASE, self._identity(), self.config.name, self._text()) as database:
             self._refuse_fewer(folder, database)
-            compile_and_make_maps((trial.config for trial in trials), MAP_CACHE, console)
+            compile_and_make_maps((trial.config for trial in trials), console)
             with executor(where) as pool:
                 ran = run_missing(trials, database, pool, self.config.recordings, console, _descriptions(trials))
             planned_keys = {trial.key for trial in trials}
@@ -218,7 +215,8 @@ class Study:
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
-        return {trial.meeting.number: cached_stability(trial.config).used for trial in _one_per_condition(trials)}
+        one_each = {trial.meeting.number: trial.config for trial in trials}
+        return {number: cached_stability(config).used for number, config in one_each.items()}
 
 
 def _check_folder(folder: Path) -> None:
@@ -227,11 +225,6 @@ def _check_folder(folder: Path) -> None:
     existing = [] if (folder / DATABASE).exists() else [name for name in names if (folder / name).exists()]
     if existing:
         raise StudyError(f"{folder}: holds {', '.join(existing)}, not of a study; choose another --out")
-
-
-def _one_per_condition(trials: Sequence[Trial]) -> list[Trial]:
-    """One trial of each condition."""
-    return list({trial.meeting.number: trial for trial in trials}.values())
 
 
 def _descriptions(trials: Sequence[Trial]) -> dict[str, dict[str, object]]:

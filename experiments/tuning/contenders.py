@@ -1,7 +1,6 @@
 """Comparison of the tuned values with baselines, on held-back users who took no part in the tuning."""
 
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from controllers.errors import ControllerError
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.certify.certify import certified_rivers
 from experiments.config.run_config import RunConfig
-from experiments.trials.analysis.statistics import RESAMPLES
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, violation_of
 from experiments.tuning.tune_config import TuneConfig
@@ -100,21 +98,3 @@ def _evaluate(config: TuneConfig, name: str, values: dict[str, float], panel: Pa
         return Contender(name, values, candidate, stability, no_results)
     runs = panel_runs(config, candidate, config.held_back)
     return Contender(name, values, candidate, stability, panel.objectives(config, runs, stability.margin))
-
-
-def interval(differences: Array, seed: int) -> tuple[float, float]:
-    """95 % BCa bootstrap interval of a mean of paired differences; NaN if they are equal, infinite or fewer than 3."""
-    from scipy.stats import bootstrap
-
-    if len(differences) < 3 or not np.all(np.isfinite(differences)) or np.ptp(differences) == 0.0:
-        return float("nan"), float("nan")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN
-        result = bootstrap((differences,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(seed))
-    return float(result.confidence_interval.low), float(result.confidence_interval.high)
-
-
-def signed_gains(contender: Contender, tuned: Contender, directions: Sequence[str]) -> Array:
-    """Differences between a contender and the tuned one by user and objective, positive where the tuned is better."""
-    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
-    return signs * (contender.by_user - tuned.by_user)

@@ -1,15 +1,94 @@
-"""report.html of a tuning: the chosen values and what they gain, in one self-contained file."""
+"""report.html of a tuning: the chosen values and what they gain, with plots of the candidates."""
 
 import html
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from controllers.certificates.loop.hand import HandRange
+from controllers.certificates.loop.stability import boundary
+from controllers.errors import ControllerError
+from experiments.certify.certify import certified_rivers
 from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
 from experiments.tuning.contenders import Contender
-from experiments.tuning.tune_config import TuneConfig, label_of
+from experiments.tuning.search import Candidate, pareto_front
+from experiments.tuning.tune_config import TuneConfig, label_of, more_is_better
+
+_TRIED, _FRONT, _CHOSEN, _REFUSED = "#7f8ea3", "#1f5fbf", "#d9542b", "#b04040"
+
+
+def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate) -> Figure:
+    """Candidates by the first two objectives with their Pareto front; for one objective, the best value over time."""
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axis = figure.subplots()
+    tried = [c for c in candidates if c.objectives is not None]
+    costs = np.array([c.objectives for c in tried])
+    if len(config.objectives) == 1:
+        best = np.maximum.accumulate(costs) if more_is_better(config.objectives[0]) else np.minimum.accumulate(costs)
+        axis.plot(costs[:, 0], "o", color=_TRIED, ms=4, label="tried")
+        axis.plot(best[:, 0], color=_FRONT, drawstyle="steps-post", label="best so far")
+        axis.set_xlabel("candidate")
+        axis.set_ylabel(label_of(config.objectives[0]))
+        axis.set_yscale("log")
+    else:
+        gain_ratio = np.array([np.nan if c.margin is None else 1.0 / (1.0 + c.margin) for c in tried])
+        points = axis.scatter(costs[:, 0], costs[:, 1], c=gain_ratio, s=26, cmap="viridis", label="tried")
+        figure.colorbar(points, label="k_r over the critical k_r (the certificate's boundary is 1)")
+        pareto = _front_of_two(config, tried)
+        axis.plot(pareto[:, 0], pareto[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both")
+        chosen_costs = np.array(chosen.objectives)
+        axis.plot(chosen_costs[:1], chosen_costs[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
+        axis.set_xlabel(label_of(config.objectives[0]))
+        axis.set_ylabel(label_of(config.objectives[1]))
+    axis.legend(framealpha=0.85, edgecolor="none", fontsize=9)
+    axis.grid(alpha=0.3)
+    return figure
+
+
+def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
+    """Pareto front of the first two objectives alone, sorted by the first, shape (n, 2)."""
+    two = [c._replace(objectives=c.objectives[:2]) for c in tried if c.objectives is not None]
+    return np.array(sorted(c.objectives for c in pareto_front(two, config.directions[:2]) if c.objectives is not None))
+
+
+def gains_figure(
+    config: TuneConfig, candidates: Sequence[Candidate], chosen: Candidate, others: Mapping[str, Mapping[str, float]]
+) -> Figure | None:
+    """Candidates in the plane of stiffness and damping, with the stability boundary; None if one of them is not tuned.
+
+    The boundary is the least over all hands of the certificate's range; None also if there is no certificate.
+    """
+    if not {"stiffness", "damping"} <= set(config.space):
+        return None
+    try:
+        river = certified_rivers(config.config(chosen.values))[""]
+    except ControllerError:
+        return None
+    span = config.space["damping"]
+    damping = np.linspace(max(span.low, 1e-3), span.high, 13)
+    critical = np.min([boundary(river, damping, hand) for hand in HandRange().hands()], axis=0)
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axis = figure.subplots()
+    axis.fill_between(damping, critical, critical.max() * 3.0, color=_REFUSED, alpha=0.12)
+    axis.plot(damping, critical, color=_REFUSED, label="certificate's boundary: unstable above")
+    for state, marker, colour in (("tried", "o", _TRIED), ("given up", ".", _TRIED), ("refused", "x", _REFUSED)):
+        places = np.array([(c.values["damping"], c.values["stiffness"]) for c in candidates if c.state == state])
+        if len(places):
+            axis.plot(places[:, 0], places[:, 1], marker, color=colour, ms=5, label=state)
+    axis.plot([chosen.values["damping"]], [chosen.values["stiffness"]], "*", color=_CHOSEN, ms=14, label="chosen")
+    for (name, values), marker in zip(others.items(), "sD^v", strict=False):
+        axis.plot([values["damping"]], [values["stiffness"]], marker, color="#333", mfc="none", ms=8, label=name)
+    axis.set_xlabel("b_d [N s/m]")
+    axis.set_ylabel("k_r [N/m]")
+    axis.set_yscale("log")
+    axis.set_ylim(0.7 * config.space["stiffness"].low, 1.5 * max(critical.max(), config.space["stiffness"].high))
+    axis.legend(framealpha=0.85, edgecolor="none", fontsize=8)
+    axis.grid(alpha=0.3)
+    return figure
+
 
 _BODY = """{sentences}
 <h2>Candidates</h2>

@@ -7,9 +7,8 @@ import numpy as np
 
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import trial_key
-from experiments.trials.design.study_config import Users
+from experiments.trials.design.study_config import StudyError, Users
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import Executor
 from experiments.trials.trial.run_trial import Row, Task

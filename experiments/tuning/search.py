@@ -1,16 +1,85 @@
 """The search of a tuning: candidates are proposed, certified and only then tried on the panel; each step is stored."""
 
+import json
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import optuna
+from optuna.distributions import FloatDistribution
+from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from experiments.certify.cached_stability import Stability, cached_stability
+from experiments.trials.design.study_config import StudyError
 from experiments.tuning.panel import Panel, panel_runs
-from experiments.tuning.samplers import MAX_PROPOSALS_RATIO, RANDOM_STARTUP_COUNT, sampler_of
 from experiments.tuning.tune_config import TuneConfig
+from geometry.arrays import Array
+
+
+def storage_of(where: str | Path) -> optuna.storages.BaseStorage:
+    """Optuna's storage in a file or at a URL.
+
+    Parameters
+    ----------
+    where : str or Path
+        File of a journal, or a URL such as ``sqlite:///tune.db`` or ``postgresql://user@host/base``.
+
+    Raises
+    ------
+    StudyError
+        If the file cannot be written or is something else, or the database cannot be reached.
+    """
+    if "://" not in str(where):
+        try:
+            with open(where, "a+b") as file:
+                file.seek(0)
+                first_line = file.readline()
+            if first_line and "op_code" not in json.loads(first_line):  # Optuna takes any single line for unfinished
+                raise ValueError
+            return optuna.storages.JournalStorage(JournalFileBackend(str(where)))
+        except OSError as error:
+            raise StudyError(f"{where}: {error.strerror}; expected a file that can be written") from None
+        except (ValueError, TypeError, KeyError):
+            raise StudyError(
+                f"{where}: is no journal of a search, and is left as it is; expected a new file, or that of a search"
+            ) from None
+    try:
+        return optuna.storages.RDBStorage(str(where))
+    except Exception as error:  # from SQLAlchemy, a driver that is not installed, or a server that does not answer
+        message = str(error).strip().splitlines()[0]
+        raise StudyError(
+            f"{where}: no storage for a search ({message}); expected a URL of SQLAlchemy such as sqlite:///tune.db"
+        ) from None
+
+
+# maximum of proposals per simulated candidate; if more are needed, hardly any point is certified
+MAX_PROPOSALS_RATIO = 30
+RANDOM_STARTUP_COUNT = 10  # candidates drawn at random before a sampler begins to learn from results
+
+
+def sampler_of(name: str, seed: int, number: int) -> optuna.samplers.BaseSampler:
+    """The sampler for a candidate by its number; an interrupted search continues as if it had not been interrupted.
+
+    A sampler's state consists of the study's results, which are stored, and its seed, which depends on the number.
+    """
+    candidate_seed = int(np.random.SeedSequence((seed, *name.encode(), number)).generate_state(1, np.uint32)[0])
+    makers: dict[str, Callable[[], optuna.samplers.BaseSampler]] = {
+        "tpe": lambda: optuna.samplers.TPESampler(
+            seed=candidate_seed, multivariate=True, n_startup_trials=RANDOM_STARTUP_COUNT
+        ),
+        "cma-es": lambda: optuna.samplers.CmaEsSampler(seed=candidate_seed, n_startup_trials=RANDOM_STARTUP_COUNT),
+        "nsga-ii": lambda: optuna.samplers.NSGAIISampler(seed=candidate_seed, population_size=RANDOM_STARTUP_COUNT),
+        "random": lambda: optuna.samplers.RandomSampler(seed=candidate_seed),
+    }
+    return makers[name]()
+
+
+def distributions_of(config: TuneConfig) -> dict[str, optuna.distributions.BaseDistribution]:
+    """Optuna's distributions of the tuned parameters."""
+    return {word: FloatDistribution(span.low, span.high, log=span.log) for word, span in config.space.items()}
+
 
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
@@ -40,13 +109,9 @@ class Candidate(NamedTuple):
 
 
 def search(
-    config: TuneConfig,
-    storage: optuna.storages.BaseStorage,
-    identity: str,
-    panel: Panel,
-    sampler: str,
+    config: TuneConfig, storage: optuna.storages.BaseStorage, identity: str, panel: Panel, sampler: str,
     progress: Callable[[int], None],
-) -> list[Candidate]:
+) -> list[Candidate]:  # fmt: skip
     """Search until enough candidates have been simulated, continuing from the candidates in the storage.
 
     Parameters
@@ -54,7 +119,7 @@ def search(
     config : TuneConfig
         The tuning.
     storage : optuna.storages.BaseStorage
-        Storage of the search; see `experiments.tuning.storage`.
+        Storage of the search; see `storage_of`.
     identity : str
         Hash of the tuning, its name in the storage.
     panel : Panel
@@ -69,24 +134,17 @@ def search(
         storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=RANDOM_STARTUP_COUNT, n_warmup_steps=1),
     )  # fmt: skip
-    space: dict[str, optuna.distributions.BaseDistribution] = {
-        word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
-        for word, span in config.space.items()
-    }
+    space = distributions_of(config)
     for interrupted in study.get_trials(states=(TrialState.RUNNING,)):
         study.tell(interrupted.number, state=TrialState.FAIL)  # it is proposed again
     while True:
-        simulated, proposed = _count_simulated(study), len(study.get_trials(deepcopy=False, states=_FINISHED))
+        proposed = candidates_of(study)
+        simulated = sum(candidate.state != "refused" for candidate in proposed)
         progress(simulated)
-        if simulated >= config.candidates or proposed >= MAX_PROPOSALS_RATIO * config.candidates:
-            return candidates_of(study)
-        study.sampler = sampler_of(sampler, config.seed, proposed)
+        if simulated >= config.candidates or len(proposed) >= MAX_PROPOSALS_RATIO * config.candidates:
+            return proposed
+        study.sampler = sampler_of(sampler, config.seed, len(proposed))
         _try_candidate(config, study, study.ask(space), panel)
-
-
-def _count_simulated(study: optuna.Study) -> int:
-    trials = study.get_trials(deepcopy=False, states=_FINISHED)
-    return sum(t.state.is_finished() and t.user_attrs.get("violation", 1.0) <= 0.0 for t in trials)
 
 
 def _try_candidate(config: TuneConfig, study: optuna.Study, trial: optuna.Trial, panel: Panel) -> None:
@@ -143,10 +201,15 @@ def candidates_of(study: optuna.Study) -> list[Candidate]:
     return candidates
 
 
+def signs_of(directions: Sequence[str]) -> Array:
+    """1 for each objective to be minimised, −1 for each to be maximised: its factor as a cost."""
+    return np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+
+
 def pareto_front(candidates: Sequence[Candidate], directions: Sequence[str]) -> list[Candidate]:
     """The Pareto front: candidates that no other one dominates."""
     tried = [candidate for candidate in candidates if candidate.objectives is not None]
-    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    signs = signs_of(directions)
     costs = np.array([signs * np.array(c.objectives) for c in tried]).reshape(len(tried), len(signs))
     return [
         c for c, cost in zip(tried, costs, strict=True)
@@ -162,7 +225,7 @@ def best_candidate(candidates: Sequence[Candidate], directions: Sequence[str]) -
     best = pareto_front(candidates, directions)
     if not best:
         return None
-    signs = np.array([1.0 if direction == "minimize" else -1.0 for direction in directions])
+    signs = signs_of(directions)
     costs = np.array([signs * np.array(c.objectives) for c in best])
     low, span = costs.min(axis=0), np.ptp(costs, axis=0)
     scaled = (costs - low) / np.where(span > 0.0, span, 1.0)

@@ -127,7 +127,7 @@ def tune(
     """
     import optuna  # an optional dependency, which takes half a second to import
 
-    from experiments.tuning.samplers import MAX_PROPOSALS_RATIO
+    from experiments.tuning.search import MAX_PROPOSALS_RATIO, sampler_of
 
     check_kind("sim", sim, Simulation)
     check_kind("panel", panel, Sequence[User])
@@ -142,11 +142,13 @@ def tune(
     # A session in the middle of the space compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _create_study(search, _study_name(sim, space, cost, len(users), seconds, search))
-    complete, distributions = (optuna.trial.TrialState.COMPLETE,), _distributions(space)
+    complete = (optuna.trial.TrialState.COMPLETE,)
+    ranges = {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
     for number in range(len(study.trials), MAX_PROPOSALS_RATIO * search.candidates):
         if len(study.get_trials(states=complete)) >= search.candidates:
             break
-        trial = _ask_candidate(study, search, distributions, number)
+        study.sampler = sampler_of(search.sampler, search.seed, number)
+        trial = study.ask(ranges)
         candidate = with_values(sim, trial.params)
         verdict = certify(candidate).stability.verdict
         allowed = verdict == "certified" or (verdict == "unknown" and search.allow_unknown)
@@ -176,12 +178,6 @@ def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
 
 
-def _distributions(space: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    import optuna
-
-    return {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
-
-
 def _study_name(
     sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: int, seconds: float, search: Search
 ) -> str:
@@ -199,19 +195,12 @@ def _study_name(
 def _create_study(search: Search, name: str) -> Any:
     import optuna
 
-    from experiments.tuning.storage import storage_of
+    from experiments.tuning.search import storage_of
 
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     storage = None if search.journal is None else storage_of(search.journal)
     directions: list[Literal["minimize", "maximize"]] = ["minimize"] * search.costs
     return optuna.create_study(storage=storage, study_name=name, load_if_exists=True, directions=directions)
-
-
-def _ask_candidate(study: Any, search: Search, distributions: Mapping[str, Any], number: int) -> Any:
-    from experiments.tuning.samplers import sampler_of
-
-    study.sampler = sampler_of(search.sampler, search.seed, number)
-    return study.ask(dict(distributions))
 
 
 def _mean_costs(

@@ -12,8 +12,7 @@ from experiments.config.keywords import to_keywords
 from experiments.config.options import run_config
 from experiments.config.part import above, at_least, from_dict, part, whole_number
 from experiments.config.run_config import RunConfig
-from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import MAX_TRIAL_DURATION, Users, Words, check_trials, read_toml
+from experiments.trials.design.study_config import MAX_TRIAL_DURATION, StudyError, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from sim.users.person.population import population
 

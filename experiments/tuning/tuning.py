@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,18 +14,16 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from experiments.certify.certify import certify_into
 from experiments.config.part import to_json
 from experiments.files.json_text import json_text
-from experiments.trials.design.errors import StudyError
+from experiments.trials.analysis.statistics import bootstrap_interval
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps
 from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
-from experiments.trials.trial.run_trial import MAP_CACHE
-from experiments.tuning.contenders import Contender, contenders, interval, signed_gains
-from experiments.tuning.page import tuning_page
+from experiments.tuning.contenders import Contender, contenders
+from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
-from experiments.tuning.plots import gains_figure, objectives_figure
-from experiments.tuning.search import Candidate, best_candidate, search
-from experiments.tuning.storage import storage_of
+from experiments.tuning.search import Candidate, best_candidate, distributions_of, search, signs_of, storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
@@ -88,10 +86,8 @@ class Tuned:
 
     def to_json(self) -> str:
         """The result without the folder, as JSON."""
-        summary = {"values": self.values, "sentences": self.sentences, "importances": self.importances}
-        comparisons = [asdict(comparison) for comparison in self.comparisons]
-        candidates = [candidate._asdict() for candidate in self.candidates]
-        return json_text(summary | {"comparisons": comparisons, "candidates": candidates})
+        names = ("values", "sentences", "importances", "comparisons", "candidates")
+        return json_text({name: getattr(self, name) for name in names})
 
 
 def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | None = None) -> Tuned:
@@ -116,9 +112,7 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
     console, text = Console(stderr=True), text or to_json(config)
     identity = hashlib.sha256(to_json(replace(config, candidates=1, name="", storage="")).encode()).hexdigest()[:16]
     with Database(out / DATABASE, identity, config.name, text) as database:
-        compile_and_make_maps(
-            panel_runs(config, config.config({}), replace(config.users, number=1))[0], MAP_CACHE, console
-        )
+        compile_and_make_maps(panel_runs(config, config.config({}), replace(config.users, number=1))[0], console)
         with executor(where or Where()) as pool:
             panel, storage = Panel(database, pool), storage_of(config.storage or out / JOURNAL)
             found = _run_search(config, storage, identity, panel, config.sampler, console)
@@ -175,9 +169,9 @@ def compared(config: TuneConfig, judged: Sequence[Contender]) -> list[Comparison
     """Comparisons of every other contender with the first one, which is the tuned one, on every objective."""
     comparisons: list[Comparison] = []
     for contender in judged[1:]:
-        gains = signed_gains(contender, judged[0], config.directions)
+        gains = signs_of(config.directions) * (contender.by_user - judged[0].by_user)  # positive where tuned is better
         for k, objective in enumerate(config.objectives):
-            low, high = interval(gains[:, k], config.seed)
+            low, high = bootstrap_interval((gains[:, k],), np.random.default_rng(config.seed))
             means = float(contender.means[k]), float(judged[0].means[k])
             comparisons.append(Comparison(contender.name, objective, *means, float(np.mean(gains[:, k])), low, high))
     return comparisons
@@ -191,10 +185,7 @@ def importances_of(config: TuneConfig, candidates: Sequence[Candidate]) -> dict[
     if len(tried) < 4 or len(config.space) < 2:
         return {}
     shares: dict[str, dict[str, float]] = {}
-    space: dict[str, optuna.distributions.BaseDistribution] = {
-        word: optuna.distributions.FloatDistribution(span.low, span.high, log=span.log)
-        for word, span in config.space.items()
-    }
+    space = distributions_of(config)
     for k, objective in enumerate(config.objectives):
         study = optuna.create_study(direction=config.directions[k])
         for c in tried:

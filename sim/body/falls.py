@@ -25,13 +25,11 @@ from sim.compilation.native import mj_differentiate_pos, mj_integrate_pos
 
 UP, DOWN, RECOVERING = 0.0, 1.0, 2.0
 TOUCH_HEIGHT = 2e-3  # [m] height below which a body touches the floor: about the softness of MuJoCo's contacts
-MAX_ROOT_DISTANCE = (
-    0.5  # [m] distance of the root from the reference's, beyond which the figure does not recover by itself
-)
+# [m] distance of the root from the reference's, beyond which the figure does not recover by itself
+MAX_ROOT_DISTANCE = 0.5
 LYING_TIME, RECOVERY_TIME = 1.0, 1.0  # [s] duration of lying on the floor, and of the return to the animation
-_REFERENCE_CLEARANCE = (
-    0.05  # [m] height above which a reference body is clear of the floor; a standing shank is at 0.058
-)
+# [m] height above which a reference body is clear of the floor; a standing shank is at 0.058
+_REFERENCE_CLEARANCE = 0.05
 _CLEARANCE = 0.25  # [m] h at the default stature; the interpolation alone takes the feet 0.15 m below the floor
 _MODE, _MODE_TIME, _FALL_COUNT = 0, 1, 2  # indices in `FallState.state`
 _ARM_SEGMENTS = ("clavicle", "arm", "forearm", "hand")  # left out: a figure that props itself on a hand has not fallen

@@ -43,11 +43,8 @@ from sim.body.drive import drive_unit
 from sim.body.falls import fall_state
 from sim.body.figure_state import REPORT_SIZE, FigureGains, FigureState
 from sim.body.mass_matrix import mass_matrix
-from sim.body.whole_body import figure_torque
 from sim.compilation.compiled import entry_point
 from sim.errors import SimError
-
-__all__ = ["CONTACTS", "Figure", "FigureGains", "FigureState", "figure_torque"]
 
 CONTACTS = FOOT_CONTACTS + HAND_CONTACTS
 # Share of the coefficient of friction with which contact forces are planned. With 0.7 or 1.0 the residual of walk, run

@@ -220,13 +220,9 @@ def tracked_motion(
     _simulate(drive.address(), *arguments)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
-        reference,
-        *log,
-        figure.state.weight,
-        standing_com(config.stature, config.mass),
-        warnings,
+        reference, *log, figure.state.weight, standing_com(config.stature, config.mass), warnings,
         math.inf if clip.closes(CLOSURE_TOLERANCE) else clip.duration,
-    )
+    )  # fmt: skip
 
 
 def track(
@@ -257,17 +253,11 @@ def report(motion: TrackedMotion) -> TrackingReport:
     on_ground, slide = up & ~in_flight, ContactSlide()
     slide.add(motion.contacts, np.less(motion.contacts[:, :, 2], 0.0) & up[:, None])
     return TrackingReport(
-        seconds=period * len(times),
-        flight_seconds=period * float(np.sum(in_flight)),
-        falls=tuple(falls.tolist()),
-        up_seconds=period * float(np.sum(up)),
-        joint_error=float(np.rad2deg(rms(joints))),
-        root_error=rms(root),
+        seconds=period * len(times), flight_seconds=period * float(np.sum(in_flight)), falls=tuple(falls.tolist()),
+        up_seconds=period * float(np.sum(up)), joint_error=float(np.rad2deg(rms(joints))), root_error=rms(root),
         root_error_max=float(root.max(initial=0.0)),
-        residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)),
-        stance=residual(~in_flight),
+        residual_in_flight=float(np.abs(wrench[up & in_flight]).max(initial=0.0)), stance=residual(~in_flight),
         without_ground_force=residual(~is_supported),
         grounded=float(np.mean(is_supported[on_ground])) if on_ground.any() else 1.0,
-        slide=slide.largest,
-        warnings=motion.warnings,
-    )
+        slide=slide.largest, warnings=motion.warnings,
+    )  # fmt: skip

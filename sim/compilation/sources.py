@@ -6,8 +6,6 @@ Comments and docstrings do not count, so a change of wording does not invalidate
 import ast
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
@@ -17,6 +15,7 @@ from pathlib import Path
 import llvmlite.binding
 
 from sim.compilation.unit_cache import cache_folder
+from sim.compilation.whole_files import atomic_file
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("geometry", "models", "controllers", "sim", "experiments")
@@ -96,10 +95,9 @@ class _CodeHashes:
             return
         with suppress(OSError):
             self._file.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=self._file.parent, suffix=".tmp")
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump({path: entry for path, entry in self._entries.items() if Path(path).exists()}, file)
-            os.replace(name, self._file)
+            entries = {path: entry for path, entry in self._entries.items() if Path(path).exists()}
+            with atomic_file(self._file) as file:
+                file.write(json.dumps(entries).encode())
 
 
 def _module_file(name: str) -> Path | None:

@@ -8,10 +8,8 @@ is ignored. Units that were not used for a long time are removed.
 # pyright: reportPrivateUsage=false, reportIncompatibleMethodOverride=false
 # The cache of a dispatcher is not public in numba; `deferred_codegen` lists the versions that were tested.
 
-import hashlib
 import os
 import pickle
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -26,9 +24,9 @@ from numba.core.serialize import dumps
 
 from sim.compilation.deferred_codegen import is_nested, referred_by_name
 from sim.compilation.unit_key import unit_key
+from sim.compilation.whole_files import read_hashed, write_hashed
 
 _SUFFIX = ".unit"
-_HASH_SIZE = hashlib.sha256().digest_size
 _MAX_UNUSED_TIME = 60 * 86400.0  # [s] after which an unused unit is removed
 _USE_TIME_RESOLUTION = 86400.0  # [s] resolution of the stored time of last use
 
@@ -75,7 +73,7 @@ class UnitCache(_Cache):
             return None
         target_context.refresh()
         path = self.path(sig)
-        content = _read(path)
+        content = read_hashed(path)
         if content is None:
             return None
         try:
@@ -95,7 +93,7 @@ class UnitCache(_Cache):
         content = dumps(data._reduce())
         path = self.path(sig)
         with suppress(OSError):
-            _write(path, content)
+            write_hashed(path, content)
             remove_forgotten(path.parent)
 
     def enable(self) -> None:
@@ -117,7 +115,7 @@ class UnitCache(_Cache):
 
 def is_sound(path: Path) -> bool:
     """Whether a file exists and its hash is right."""
-    return _read(path) is not None
+    return read_hashed(path) is not None
 
 
 def remove_forgotten(folder: Path) -> None:
@@ -127,26 +125,6 @@ def remove_forgotten(folder: Path) -> None:
         with suppress(OSError):
             if now - path.stat().st_mtime > _MAX_UNUSED_TIME:
                 path.unlink()
-
-
-def _read(path: Path) -> bytes | None:
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    return content[_HASH_SIZE:] if hashlib.sha256(content[_HASH_SIZE:]).digest() == content[:_HASH_SIZE] else None
-
-
-def _write(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def _mark_used(path: Path) -> None:

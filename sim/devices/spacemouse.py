@@ -46,8 +46,6 @@ class SpaceMouse:
         For display.
     clock : callable
         Clock by which the velocity is integrated, and which timestamps the readings [s].
-    start : Array, optional
-        Initial position of the tip in H [m], shape (3,); by default the origin.
     """
 
     def __init__(
@@ -56,14 +54,13 @@ class SpaceMouse:
         name: str,
         transport: str,
         clock: Callable[[], float] = time.perf_counter,
-        start: Array | None = None,
     ):
         self._handle, self._clock = handle, clock
         handle.set_nonblocking(True)
         self.identity = DeviceIdentity(name, transport, "", "", False, False, True)
         self.telemetry = make_telemetry()
         self._deflection, self._buttons = np.zeros(6), 0
-        self._p_H = np.zeros(3) if start is None else start.copy()
+        self._p_H = np.zeros(3)
         self._r_HS = np.eye(3)
         self._last_time: float | None = None
         self._reading_count = 0

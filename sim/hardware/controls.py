@@ -230,13 +230,9 @@ class HardwareRun:
         force = status[RECORDER_FORCE : RECORDER_FORCE + 3]
         alive = self.recorder.is_alive() and error == 0
         return RecorderStatus(
-            alive,
-            int(status[RECORDER_ROWS]),
-            int(status[RECORDER_DROPPED]),
-            error,
-            force,
+            alive, int(status[RECORDER_ROWS]), int(status[RECORDER_DROPPED]), error, force,
             float(status[RECORDER_APART]),
-        )
+        )  # fmt: skip
 
     def stop(self) -> Ended | None:
         """End the servo, then the recorder once it has written all rows; returns the servo's final report, if any."""

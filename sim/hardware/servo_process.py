@@ -172,14 +172,9 @@ def read_orders(count: IntArray, shared: Array, whole: Array, order: Array, pare
 
 @entry_point
 def publish_row(
-    row: Array,
-    status_count: IntArray,
-    status: Array,
-    count: IntArray,
-    rows: Array,
-    compute: DurationHistogram,
+    row: Array, status_count: IntArray, status: Array, count: IntArray, rows: Array, compute: DurationHistogram,
     lateness: DurationHistogram,
-) -> None:
+) -> None:  # fmt: skip
     """Publish a tick's row in status and ring, and count its computing time and lateness."""
     write_whole(status_count, status, row)
     append_row(count, rows, row)

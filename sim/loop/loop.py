@@ -1,10 +1,12 @@
 """A run: compiled blocks of servo ticks one after the other, streamed to a recorder in constant memory."""
 
+import resource
 import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,13 +24,7 @@ BLOCK_SECONDS = 0.2  # simulated time of a block [s]: the clock and the recorder
 
 
 class RunTimes(NamedTuple):
-    """Speed of a run.
-
-    Attributes
-    ----------
-    simulated, wall : float
-        Simulated time, and the wall-clock time it took [s].
-    """
+    """Simulated time of a run, and the wall-clock time it took [s]."""
 
     simulated: float
     wall: float
@@ -37,6 +33,22 @@ class RunTimes(NamedTuple):
     def real_time_factor(self) -> float:
         """Simulated time divided by wall-clock time."""
         return self.simulated / self.wall if self.wall > 0.0 else float("inf")
+
+
+_STATUS = Path("/proc/self/status")
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far [MB].
+
+    Linux reports it in ``/proc/self/status`` (VmHWM, man 5 proc). Its ``getrusage`` would include the peak that the
+    parent had reached when it started this process.
+    """
+    if _STATUS.exists():
+        line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))
+        return int(line.split()[1]) / 1e3
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
 
 
 def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
@@ -94,16 +106,11 @@ class Loop:
     """
 
     def __init__(
-        self,
-        servo: Servo,
-        world: World,
-        observe: Observer = lambda ticks, frames, n: None,
-        block_seconds: float = BLOCK_SECONDS,
-        python_laws: Sequence[Callable[[HandState], Array]] = (),
-        before_tick: Callable[[int], None] | None = None,
-        ask: Callable[[float], None] | None = None,
+        self, servo: Servo, world: World, observe: Observer = lambda ticks, frames, n: None,
+        block_seconds: float = BLOCK_SECONDS, python_laws: Sequence[Callable[[HandState], Array]] = (),
+        before_tick: Callable[[int], None] | None = None, ask: Callable[[float], None] | None = None,
         ask_seconds: float = BLOCK_SECONDS,
-    ):
+    ):  # fmt: skip
         self.servo, self.world, self._observe = servo, world, observe
         every = servo.figure_ticks
         self._block_ticks = every * max(1, round(block_seconds / servo.plant.period / every))

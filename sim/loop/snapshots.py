@@ -17,17 +17,7 @@ _CONSTANT_FIELDS = {"params", "ops", "units", "maps", "feeds", "slots", "limits"
 
 
 class Snapshot(NamedTuple):
-    """State of a servo and its world between two ticks.
-
-    Attributes
-    ----------
-    tick : int
-        Number of the next tick.
-    data : MjData
-        Copy of the world's state.
-    arrays : tuple of Array
-        Copies of the arrays of device, field, reference and figure, in the order of `state_arrays`.
-    """
+    """Number of the next tick, and copies of the MjData and of the `state_arrays` before it."""
 
     tick: int
     data: mujoco.MjData

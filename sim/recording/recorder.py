@@ -198,13 +198,9 @@ class Recorder:
     """
 
     def __init__(
-        self,
-        path: Path,
-        config: Mapping[str, object],
-        seed: int,
-        groups: Mapping[str, Group],
+        self, path: Path, config: Mapping[str, object], seed: int, groups: Mapping[str, Group],
         static: Mapping[str, npt.ArrayLike | str],
-    ):
+    ):  # fmt: skip
         if path.exists():
             raise RecordingError(f"{path}: exists; a recording is never overwritten, choose another name")
         temporary = path.with_name(f".{path.name}.{os.getpid()}")

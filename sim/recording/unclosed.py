@@ -24,17 +24,7 @@ _END_OFFSET = 28
 
 
 class Superblock(NamedTuple):
-    """The superblock of an HDF5 file.
-
-    Attributes
-    ----------
-    head : bytes
-        Its 48 bytes.
-    end : int
-        Size of the file according to the superblock [bytes].
-    size : int
-        True size of the file [bytes].
-    """
+    """The 48 bytes of an HDF5 superblock, the size of the file [bytes] that they give, and the true one."""
 
     head: bytes
     end: int

@@ -7,8 +7,8 @@ import numpy as np
 from numba import typeof, types
 
 from controllers.fields.algebra.instructions import VECTOR
-from controllers.haptic_map.base import HapticMap
-from controllers.haptic_map.map_stages import CompiledMap, evaluate_map, kernels_of
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
+from controllers.haptic_map.map_stages import CompiledMap, evaluate_map, evaluate_map_jacobian, kernels_of
 from controllers.haptic_map.river_clips import river_clips_map
 from controllers.kernel_call import call_as_given
 from controllers.legs.limbs import LIMB_SIZE
@@ -135,14 +135,9 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
 
 
 def make_reference(
-    figure_model: mujoco.MjModel,
-    compiled: CompiledMap,
-    period: float,
-    bandwidth: float,
-    blend: float = 0.0,
-    limbs: Array | None = None,
-    clip_seconds: float = 0.0,
-) -> CompiledReference:
+    figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float, blend: float = 0.0,
+    limbs: Array | None = None, clip_seconds: float = 0.0,
+) -> CompiledReference:  # fmt: skip
     """The reference of a run, before its first update, without the addresses of the map's kernels.
 
     So nothing need be compiled yet; `reference_along` and `sim.loop.servo.Servo.linked` fill the addresses in.
@@ -196,3 +191,27 @@ def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition
         settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq),
         after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip
+
+
+@entry_point
+def _derivative(stages: IntArray, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
+    evaluate_map_jacobian(stages, params, x, memory, pose, jacobian)
+
+
+def derivative_unit() -> Unit:
+    """The compilation unit of `map_derivative`, without the map's kernels."""
+    matrix, stages = types.Array(types.float64, 2, "C"), types.Array(types.int64, 2, "C")
+    return Unit.of(_derivative, stages, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
+
+
+def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
+    """`HapticMap.jacobian` at a stylus pose (7,), bit for bit the same, by kernels from the compilation cache.
+
+    Returns
+    -------
+    Array, shape (nv, 6)
+    """
+    stages, params, memory, _ = haptic_map.compiled()
+    pose, jacobian = np.empty(haptic_map.nq), np.empty((haptic_map.nv, STYLUS_TANGENT))
+    _derivative(linked_stages(stages), params, x, memory, pose, jacobian)
+    return jacobian

@@ -29,9 +29,36 @@ from controllers.legs.footsteps import limb_end
 from controllers.motion.inertialization import stopping_distance
 from geometry.arrays import Array
 from geometry.rotations import rotate
+from sim.reference.floor_lowering import clearance
 from sim.reference.reference_state import CompiledReference, apply_transition, evaluate_around_in_river
-from sim.reference.transition import note_change, pivot_of, plan_depth, set_duration
-from sim.reference.waiting import has_waited_enough, is_leaping, is_standing
+from sim.reference.transition import DWELL_TIME, Transition, note_change, pivot_of, plan_depth, set_duration
+
+_STANDING_CLEARANCE = 0.01  # [m] clearance of the feet below which the figure stands
+_LEAP_CLEARANCE = 0.05  # [m] clearance of the feet above which it is in a leap
+_TAKE_OFF_SPEED = 0.6  # [m/s] vertical speed of the root above which the figure takes off: enough to rise by 2 cm
+_MAX_WAIT_TIME = 1.0  # [s] longest wait of a change
+
+
+@njit
+def is_standing(transition: Transition, pose: Array, rise: float, size: float) -> bool:
+    """Whether a figure stands and is not about to take off; `rise` is the vertical speed of its root [m/s]."""
+    return clearance(transition.limbs, transition.ends, pose, size) < _STANDING_CLEARANCE and rise < _TAKE_OFF_SPEED
+
+
+@njit
+def is_leaping(transition: Transition, pose: Array, size: float) -> bool:
+    """Whether a pose is in the middle of a flight, where no new motion may begin; `size` is that of the figure."""
+    return clearance(transition.limbs, transition.ends, pose, size) > _LEAP_CLEARANCE
+
+
+@njit
+def has_waited_enough(transition: Transition) -> bool:
+    """Whether the river that would take over has waited long enough; without legs or blend time there is no wait."""
+    return (
+        transition.candidate_river[1] > DWELL_TIME + _MAX_WAIT_TIME
+        or transition.seconds == 0.0
+        or transition.limbs.shape[0] == 0
+    )
 
 
 @njit
@@ -117,7 +144,7 @@ def _begin_transition(reference: CompiledReference, params: Array) -> None:
 def may_change(reference: CompiledReference, params: Array, river: float, phase: float) -> bool:
     """Whether a change to another river's clip may begin now.
 
-    The figure must stand and the new clip must not be in flight during the transition; see `sim.reference.waiting`. A
+    The figure must stand and the new clip must not be in flight during the transition; see `is_standing`. A
     river that has waited long enough is let through regardless.
     """
     transition, memory, x = reference.transition, reference.scratch_memory, reference.scratch_x

@@ -36,14 +36,9 @@ class Actor:
                 self._frames[shape.body] = scene.add_frame(node, show_axes=False)
             opacity = GHOST_OPACITY if ghost else shape.rgba[3]
             scene.add_mesh_simple(
-                f"{node}/{i}",
-                shape.vertices * scale,
-                shape.faces,
-                color=rgb(ghost) if ghost else shape.rgba[:3],
-                opacity=None if opacity == 1 else opacity,
-                cast_shadow=not ghost,
-                receive_shadow=False,
-            )
+                f"{node}/{i}", shape.vertices * scale, shape.faces, color=rgb(ghost) if ghost else shape.rgba[:3],
+                opacity=None if opacity == 1 else opacity, cast_shadow=not ghost, receive_shadow=False,
+            )  # fmt: skip
 
     def pose(self, data: mujoco.MjData, origin: Array, scale: float, at: Array) -> None:
         """Draw each body at ``at + scale (x − origin)``."""

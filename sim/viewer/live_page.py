@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 import viser
 
-from sim.viewer.courses import Course
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Course, Moment
 from sim.viewer.views import VIEWS, add_view_buttons, open_with
 
 _MAX_FPS = 30.0  # frames sent per second

@@ -14,11 +14,10 @@ import viser
 from geometry.arrays import Array
 from models.world.scene import P_WH
 from sim.viewer.actor import GHOST, Actor
-from sim.viewer.courses import Course
 from sim.viewer.framing import TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, simplify_shapes, tube
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Course, Moment
 
 MAGNIFICATION = 8.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.7, -0.6, 1.2])  # [m] where the hand frame's origin is drawn, out of the figure's reach

@@ -8,7 +8,6 @@ the floor moves under it.
 
 import contextlib
 import io
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,10 +17,10 @@ from geometry.arrays import Array
 from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
-from sim.viewer.courses import Course, courses
 from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, PUSH, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
+from sim.viewer.shown import Course, courses
 
 FPS = 30.0  # [1/s]
 SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown
@@ -34,25 +33,8 @@ TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the path of the stylu
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
 
 
-class _BodyLabels(NamedTuple):
-    """Labels of the body that follows the animation.
-
-    Attributes
-    ----------
-    name, animation : str
-        Labels of the body and of its reference.
-    height : float
-        Height of the labels [m].
-    """
-
-    name: str
-    animation: str
-    height: float
-
-
-_BODY_LABELS = {
-    FIGURE: _BodyLabels("physical figure", "animation h(p)", 2.0), ROBOT: _BodyLabels("robot arm", "h(p, R)", 1.6)
-}  # fmt: skip
+_BODY_LABELS = {FIGURE: ("physical figure", "animation h(p)", 2.0), ROBOT: ("robot arm", "h(p, R)", 1.6)}
+"""Labels of the body that follows the animation and of the animation, and their height [m]."""
 
 
 def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
@@ -105,7 +87,7 @@ class _Stage:
         # A kinematic figure is drawn once, without a ghost; there may be no figure at all.
         kind = recording.texts.get("figure", "physical")
         self._is_simulated, prefix = kind in ("physical", "robot"), body_prefix(model)
-        labels = _BODY_LABELS[prefix]
+        name, animation, height = _BODY_LABELS[prefix]
         names = ("t", "qpos") if kind == "none" else ("t", "qpos", "reference")
         self._frames = {name: recording.channel("frames", name) for name in names}
         self._data = mujoco.MjData(model)
@@ -131,11 +113,11 @@ class _Stage:
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
-        label_offset = np.array([0.0, 0.0, labels.height])
+        label_offset = np.array([0.0, 0.0, height])
         if kind != "none":
-            self._label("figure", labels.name if self._is_simulated else labels.animation, label_offset)
+            self._label("figure", name if self._is_simulated else animation, label_offset)
         if self._is_simulated:
-            self._label("ghost", labels.animation, GHOST_AT + label_offset)
+            self._label("ghost", animation, GHOST_AT + label_offset)
 
     def _label(self, name: str, text: str, position: Array) -> None:
         self._scene.add_label(
@@ -155,15 +137,9 @@ class _Stage:
             return
         vertices, faces = tube(line, MAGNIFICATION * radius)
         self._scene.add_mesh_simple(
-            f"{node}/tube",
-            vertices,
-            faces,
-            color=rgb(course.tube),
-            opacity=0.16,
-            side="double",
-            cast_shadow=False,
+            f"{node}/tube", vertices, faces, color=rgb(course.tube), opacity=0.16, side="double", cast_shadow=False,
             receive_shadow=False,
-        )
+        )  # fmt: skip
 
     def play(self, server: viser.ViserServer) -> str:
         """Run through the recording and return the page."""

@@ -17,19 +17,7 @@ _MIN_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
 
 
 class Shape(NamedTuple):
-    """Triangles of one colour that move with one body.
-
-    Attributes
-    ----------
-    body : int
-        Index of the body.
-    vertices : array (v, 3)
-        In the body's frame [m].
-    faces : array (f, 3)
-        Indices of vertices.
-    rgba : tuple of float
-        Colour and opacity, 0 to 1.
-    """
+    """Triangles that move with a body: its index, vertices (v, 3) in its frame [m], faces (f, 3), colour 0 to 1."""
 
     body: int
     vertices: Array

@@ -1,8 +1,32 @@
-"""The data of a moment of a run that is displayed."""
+"""What is displayed of a run: its curves, and a moment of it; time kept in step with the clock of who watches."""
 
+import time
+from collections.abc import Mapping
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from geometry.arrays import Array
+from sim.viewer.palette import CURVE, TUBE, river_colors
+
+
+class Course(NamedTuple):
+    """A curve as it is drawn: name of the river or empty, points (m, 3) in H [m], colours ``#rrggbb``."""
+
+    name: str
+    points: Array
+    line: str
+    tube: str
+
+
+def courses(static: Mapping[str, npt.ArrayLike | str]) -> tuple[Course, ...]:
+    """The curves in a recording's arrays and texts: ``curve``, or ``river_curves`` with their ``river_names``."""
+    if "river_curves" not in static:
+        return (Course("", np.asarray(static["curve"], dtype=np.float64), CURVE, TUBE),)
+    names, curves = str(static["river_names"]).split("\n"), np.asarray(static["river_curves"], dtype=np.float64)
+    drawn = zip(names, curves, river_colors(len(names)), strict=True)
+    return tuple(Course(name, points, color, color) for name, points, color in drawn)
 
 
 class Moment(NamedTuple):
@@ -29,3 +53,22 @@ class Moment(NamedTuple):
     force: Array
     user: Array
     target: Array
+
+
+class RealTime:
+    """Sleeps until the wall clock has caught up with the simulated time.
+
+    The clock starts with the first wait. A simulation that is late is not made to catch up: the origin of the wall
+    clock is moved instead.
+    """
+
+    def __init__(self) -> None:
+        self._origin: float | None = None
+
+    def wait_until(self, t: float) -> None:
+        """Sleep until the wall clock reaches simulated time t [s]."""
+        now = time.monotonic()
+        if self._origin is None or now - self._origin > t:
+            self._origin = now - t
+        else:
+            time.sleep(self._origin + t - now)

@@ -20,17 +20,7 @@ DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not repor
 
 
 class View(NamedTuple):
-    """The region that is viewed, and the direction to the camera.
-
-    Attributes
-    ----------
-    centre : tuple of float
-        Centre of the region [m].
-    half : tuple of float
-        Half its width and half its height on the screen [m].
-    side : tuple of float
-        Direction from the centre to the camera, of any length.
-    """
+    """Centre of the region that is viewed, half its width and height [m], and a vector to the camera."""
 
     centre: tuple[float, float, float]
     half: tuple[float, float]

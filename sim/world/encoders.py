@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from controllers.safety.faults import (
-    FAULT_CODE,
-    FORCE_NOT_FINITE,
-    RESTARTED,
-    Plausibility,
-    latch,
-    note_command,
-)
+from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, RESTARTED, Plausibility, latch, note_command
 from controllers.state import (
     HAND_ANGULAR_VELOCITY,
     HAND_POSITION,

@@ -1,6 +1,7 @@
 """Encoders and motors of the simulated Phantom: the link between the compiled loop and MuJoCo's state."""
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import mujoco
@@ -97,20 +98,18 @@ def phantom_port(model: mujoco.MjModel, data: mujoco.MjData, period: float, cuto
         If the cutoff is not positive and finite.
     """
 
-    def place(names: tuple[str, ...], kind: str) -> tuple[int, int, int]:
-        table = {"q": model.jnt_qposadr, "v": model.jnt_dofadr}
-        if kind == "motor":
-            a, b, c = (model.actuator(PHANTOM + name).id for name in names)
-        else:
-            a, b, c = (int(table[kind][model.joint(PHANTOM + name).id]) for name in names)
-        return int(a), int(b), int(c)
+    def three(numbers: Iterable[int]) -> tuple[int, int, int]:
+        a, b, c = map(int, numbers)
+        return a, b, c
 
+    arm, gimbal = ([model.joint(PHANTOM + name).id for name in names] for names in (MOTOR_JOINTS, GIMBAL_JOINTS))
     hand = np.zeros(HAND_SIZE)
     hand[HAND_QUATERNION] = 1.0
     return PhantomPort(
         qpos=data.qpos, qvel=data.qvel, ctrl=data.ctrl, applied=data.qfrc_applied,
-        arm_q=place(MOTOR_JOINTS, "q"), arm_v=place(MOTOR_JOINTS, "v"), gimbal_q=place(GIMBAL_JOINTS, "q"),
-        gimbal_v=place(GIMBAL_JOINTS, "v"), motor=place(MOTORS, "motor"), period=period,
+        arm_q=three(model.jnt_qposadr[arm]), arm_v=three(model.jnt_dofadr[arm]),
+        gimbal_q=three(model.jnt_qposadr[gimbal]), gimbal_v=three(model.jnt_dofadr[gimbal]),
+        motor=three(model.actuator(PHANTOM + name).id for name in MOTORS), period=period,
         smoothing=velocity_smoothing(cutoff, period),
         memory=np.zeros(MEMORY_SIZE), hand=hand, torque=np.zeros(3), faults=plausibility(period).fresh(),
     )  # fmt: skip

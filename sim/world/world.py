@@ -21,15 +21,7 @@ from models.phantom.kinematics import (
 )
 from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS
 from models.robot_arm.spec import ARM_JOINTS, arm_model
-from models.world.scene import (
-    FIGURE,
-    PHANTOM,
-    ROBOT,
-    SceneConfig,
-    device_world_model,
-    robot_world_model,
-    world_model,
-)
+from models.world.scene import FIGURE, PHANTOM, ROBOT, SceneConfig, device_world_model, robot_world_model, world_model
 from sim.errors import SimError
 
 FigureKind: TypeAlias = Literal["physical", "kinematic", "none"]
@@ -80,12 +72,7 @@ class World:
         object.__setattr__(self, "body", body)
 
     def reset(
-        self,
-        p_H: Array,
-        pose: Array,
-        q_HS: Quat | None = None,
-        v_H: Array | None = None,
-        velocity: Array | None = None,
+        self, p_H: Array, pose: Array, q_HS: Quat | None = None, v_H: Array | None = None, velocity: Array | None = None
     ) -> None:
         """Put the stylus at a point and the body in a pose, at rest or in motion.
 

@@ -41,7 +41,8 @@ class CapBackend:
 def spacemouse_rig(device: Exchange, handle: HidHandle, send: Callable[[bytes], None], transport: str) -> Rig:
     backend = CapBackend(send)
     start = np.array([0.02, 0.01, 0.0])
-    mouse = SpaceMouse(handle, "SpaceNavigator", transport, lambda: backend.ticks * 1e-3, start)
+    mouse = SpaceMouse(handle, "SpaceNavigator", transport, lambda: backend.ticks * 1e-3)
+    mouse.start_at(start)
     return Rig(device, mouse, backend)
 
 

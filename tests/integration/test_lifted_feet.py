@@ -8,8 +8,7 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.motion.lap import MEMORY
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
-from experiments.lifting.map_quality import in_between
-from experiments.lifting.motion_measure import measure_motion
+from experiments.lifting.map_quality import in_between, measure_motion
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip

@@ -13,7 +13,7 @@ import hvf
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.config.run_config import load_config
-from experiments.results.pages.report_of import write_report_of
+from experiments.results.pages.report import write_report_of
 from experiments.setups.maps.robot_arm import HOME
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.wiring import wire

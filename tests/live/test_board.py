@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from experiments.live.session.board import Board
+from experiments.live.session.messages import Board
 
 SIZES = {"a": 3, "b": 500}
 

@@ -10,7 +10,7 @@ import pytest
 from experiments.config.options import run_config
 from experiments.live.cap_hand import CapHand
 from experiments.live.gate import Gate
-from experiments.live.panels.hand_keys import STEP
+from experiments.live.panels.clock_panel import STEP
 from experiments.live.session.desk import MAX_UPLOAD_BYTES
 from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
 from controllers.checks import check_field_types
 from controllers.errors import ParameterError
 from geometry.arrays import Array
+
+MAX_STIFFNESS, MAX_DAMPING = 1e6, 1e4
+"""[N/m], [N s/m]: beyond any device, and beyond any hand."""
+
 
 _MAX_MASS = 1e3  # [kg] more than any hand, and small enough for accurate eigenvalues of the loop
 

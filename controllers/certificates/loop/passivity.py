@@ -12,8 +12,7 @@ the directions across the curve; both conditions are for one axis and are applie
 
 import numpy as np
 
-from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.largest_gains import MAX_STIFFNESS
+from controllers.certificates.loop.hand import MAX_STIFFNESS, HandImpedance
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
-from controllers.certificates.loop.hand import NO_HAND, HandImpedance
-from controllers.certificates.loop.largest_gains import MAX_DAMPING, MAX_STIFFNESS
+from controllers.certificates.loop.hand import MAX_DAMPING, MAX_STIFFNESS, NO_HAND, HandImpedance
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.linear_loop import LinearLoop, linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop

@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
 from experiments.config.modes import StretchThenFollow
 from experiments.live.panels import Acts
 from experiments.live.session.desk import HISTORY_DURATION, Desk
+from geometry.arrays import Array
 
 PLAYBACK_RATES = {"real time": 1.0, "1/2": 0.5, "1/4": 0.25, "1/10": 0.1}
 
@@ -37,13 +39,9 @@ class ClockPanel:
         self._edit = gui.add_button_group("Edit", ("Undo", "Redo"))
         self._pace = gui.add_dropdown("Pace", tuple(PLAYBACK_RATES))
         self._look_back = gui.add_slider(
-            "Look back [s]",
-            -HISTORY_DURATION,
-            0.0,
-            0.1,
-            0.0,
+            "Look back [s]", -HISTORY_DURATION, 0.0, 0.1, 0.0,
             hint="The present is at the right; time is paused while you look back.",
-        )
+        )  # fmt: skip
         self._resume = gui.add_button("Resume from there", visible=False)
         self._rearm = gui.add_button("Re-arm", visible=False, color="red", hint="The force ramps up from zero.")
         self._grab.on_update(acts(lambda event: desk.press(self._grab.value)))
@@ -112,3 +110,33 @@ class ClockPanel:
         self._desk.go_back(self.seconds_ago)
         self._look_back.value = 0.0
         self._desk.pause(False)
+
+
+STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
+RELEASE_KEY = "H"
+KEY_DIRECTIONS: dict[str, tuple[str, Array]] = {
+    "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
+    "L": ("Hand to the right", np.array([1.0, 0.0, 0.0])),
+    "I": ("Hand away", np.array([0.0, 1.0, 0.0])),
+    "K": ("Hand towards you", np.array([0.0, -1.0, 0.0])),
+    "U": ("Hand up", np.array([0.0, 0.0, 1.0])),
+    "O": ("Hand down", np.array([0.0, 0.0, -1.0])),
+}
+"""Label and direction in H of each key, as seen in the views; WASD, Q, E and the arrows move viser's camera."""
+
+
+def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[], bool]) -> None:
+    """Let keys move the hand, which holds the stylus until `RELEASE_KEY`; the first arguments are `ClockPanel`'s.
+
+    Parameters
+    ----------
+    pressed : callable
+        Whether the switch is pressed.
+    """
+
+    def handler(direction: Array) -> Callable[[Any], None]:
+        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * direction, pressed())
+
+    for key, (label, direction) in KEY_DIRECTIONS.items():
+        gui.add_command(label, hotkey=key).on_trigger(acts(handler(direction)))  # pyright: ignore[reportArgumentType]
+    gui.add_command("Let go of the stylus", hotkey=RELEASE_KEY).on_trigger(acts(lambda event: desk.let_go()))

@@ -1,17 +1,16 @@
-"""Panel of the live page for the choice of mode, map, figure and clips."""
+"""Panels of the live page for the choice of mode, map, figure and clips, and for uploading a motion file."""
 
+import time
 from typing import Any
 
 import viser
 
-from controllers.errors import ParameterError
 from experiments.config.maps import MAPS, Led, MapFile, RobotArm
 from experiments.config.modes import MODES
 from experiments.config.options import run_config
-from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.live.panels import Acts
-from experiments.live.session.desk import Desk
+from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 from experiments.live.session.messages import Built
 from models.mocap.library import embedded_names
 
@@ -43,9 +42,7 @@ class RunPanel:
         with gui.add_folder("Run"):
             self._mode = gui.add_dropdown("Mode", modes, initial_value=config.mode.kind)
             self._map = gui.add_dropdown(
-                "Map",
-                tuple(kind for kind in maps if kind != "file" or self._file),
-                initial_value=_map_kind(config),
+                "Map", tuple(kind for kind in maps if kind != "file" or self._file), initial_value=_map_kind(config)
             )
             self._figure = gui.add_dropdown("Figure", ("physical", "kinematic"), initial_value=config.figure.kind)
             self._folder = gui.add_folder("Clips")
@@ -140,14 +137,33 @@ def _clip_label(clip: str) -> str:
     return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
 
 
-def configuration_text(config: RunConfig | None) -> str:
-    """A configuration as JSON, for ``hvf run --config``.
+class UploadsPanel:
+    """Upload and its progress; the arguments are those of `ClockPanel`."""
 
-    Raises
-    ------
-    ParameterError
-        If nothing runs yet.
-    """
-    if config is None:
-        raise ParameterError("nothing runs yet; expected a run whose configuration can be kept")
-    return to_json(config)
+    def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
+        self._desk = desk
+        gui.add_markdown(
+            "A **BVH**, or an **ASF** and then its **AMC**: calibrated, put on the floor, looped or at rest, made "
+            "feasible on contact, as `hvf prepare` does. It is then the first of the clips under *Play*."
+        )
+        self._upload = gui.add_upload_button(
+            f"Upload a motion (up to {MAX_UPLOAD_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
+        )
+        self._status = gui.add_markdown("", visible=False)
+        self._bar = gui.add_progress_bar(100.0, visible=False, animated=True)
+        self._ready_text = gui.add_markdown("")
+        self._upload.on_upload(acts(self._on_upload))
+
+    def write(self) -> None:
+        """Show the file being prepared and the clips that are ready."""
+        preparing = self._desk.preparing
+        self._bar.visible = self._status.visible = preparing is not None
+        if preparing is not None:
+            name, since = preparing
+            self._status.content = f"Preparing **{name}**: {time.monotonic() - since:.0f} s so far, of ten to sixty."
+        if self._desk.clips:
+            self._ready_text.content = "Ready: " + ", ".join(f"**{name}**" for name in self._desk.clips)
+
+    def _on_upload(self, event: Any) -> None:
+        file = self._upload.value
+        self._desk.upload(file.name, file.content)

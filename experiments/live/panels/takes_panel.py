@@ -10,8 +10,8 @@ import numpy as np
 import viser
 
 from controllers.errors import ParameterError
+from experiments.config.part import to_json
 from experiments.live.panels import Acts
-from experiments.live.panels.run_panel import configuration_text
 from experiments.live.session.desk import Desk
 from experiments.live.session.take_mix import FPS, Region, TakeData, mixed
 from experiments.results.folder import EDITED, RECORDING
@@ -106,7 +106,9 @@ class TakesPanel:
     def _on_download(self, event: Any) -> None:
         kind = self._download.value
         if kind == "Configuration":
-            _send(event, "config.json", configuration_text(self._desk.config).encode())
+            if self._desk.config is None:
+                raise ParameterError("nothing runs yet; expected a run whose configuration can be kept")
+            _send(event, "config.json", to_json(self._desk.config).encode())
             return
         file = self._take_folder(self._list) / (EDITED if kind == "BVH" else RECORDING)
         _send(event, f"{self._list.value}{file.suffix}", file.read_bytes())
@@ -129,7 +131,10 @@ class TakesPanel:
         self._ghosts = TakeGhosts(self._scene, self._model, {"0": first.path, "1": second.path})
         self._legend.content = _legend((first, second))
         n = max(len(first.force), len(second.force))
-        self._plot.data = (np.arange(n) / FPS, *(_padded(take.force, n) for take in (first, second)))
+        self._plot.data = (
+            np.arange(n) / FPS,
+            *(np.pad(take.force, (0, n - len(take.force)), constant_values=np.nan) for take in (first, second)),
+        )
         self._plot.visible = True
 
     def _on_mix(self) -> None:
@@ -168,10 +173,6 @@ class TakesPanel:
 
 def _send(event: Any, name: str, content: bytes) -> None:
     event.client.send_file_download(name, content, save_immediately=True)
-
-
-def _padded(values: np.ndarray, n: int) -> np.ndarray:
-    return np.concatenate([values, np.full(n - len(values), np.nan)])
 
 
 def _legend(takes: tuple[TakeData, ...]) -> str:

@@ -17,17 +17,13 @@ from experiments.live.session.messages import (
     Build,
     Built,
     GoBack,
+    Order,
     Perform,
     Progress,
-    Rearm,
     Record,
-    Redo,
     Refused,
-    Reset,
     Saved,
     SetGains,
-    Stop,
-    Undo,
 )
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from geometry.arrays import Array
@@ -186,7 +182,7 @@ class Desk:
     def reset(self) -> None:
         """Return to the beginning."""
         self.let_go()
-        self.engine.ask(Reset())
+        self.engine.ask(Order.RESET)
 
     def go_back(self, seconds_ago: float) -> None:
         """Continue from the last stored state before the time `seconds_ago` [s] ago; one state is stored per second."""
@@ -199,7 +195,7 @@ class Desk:
 
     def rearm(self) -> None:
         """Clear a latched fault."""
-        self.engine.ask(Rearm())
+        self.engine.ask(Order.REARM)
 
     def set_gain(self, name: str, value: float) -> None:
         """Set a gain.
@@ -216,9 +212,7 @@ class Desk:
             return
         last = self._undo_stack[-1] if self._undo_stack else UndoableAction()
         if last.after is before and self._changed_gains(last) == {name}:
-            self._undo_stack[-1] = UndoableAction(
-                last.before, after
-            )  # successive moves of a slider are undone together
+            self._undo_stack[-1] = UndoableAction(last.before, after)  # moves of a slider are undone together
         else:
             self._undo_stack.append(UndoableAction(before, after))
         self._redo_stack.clear()
@@ -235,26 +229,24 @@ class Desk:
         if not self._undo_stack:
             self._say("Nothing to undo.")
             return
-        doing = self._undo_stack.pop()
-        self._redo_stack.append(doing)
-        if doing.before is None:
-            self._expected_bends = self._bend_count - 1
-            self.engine.ask(Undo())
-        else:
-            self._apply_config(doing.before)
+        self._redo_stack.append(self._undo_stack.pop())
+        self._go_to(self._redo_stack[-1].before, -1)
 
     def redo(self) -> None:
         """Redo the last undone action."""
         if not self._redo_stack:
             self._say("Nothing to redo.")
             return
-        doing = self._redo_stack.pop()
-        self._undo_stack.append(doing)
-        if doing.after is None:
-            self._expected_bends = self._bend_count + 1
-            self.engine.ask(Redo())
-        else:
-            self._apply_config(doing.after)
+        self._undo_stack.append(self._redo_stack.pop())
+        self._go_to(self._undo_stack[-1].after, 1)
+
+    def _go_to(self, config: RunConfig | None, bends: int) -> None:
+        """Apply a configuration; without one, undo (−1) or redo (1) a bend."""
+        if config is not None:
+            self._apply_config(config)
+            return
+        self._expected_bends = self._bend_count + bends
+        self.engine.ask(Order.REDO if bends > 0 else Order.UNDO)
 
     def _apply_config(self, config: RunConfig) -> None:
         self.config = config
@@ -307,7 +299,7 @@ class Desk:
 
     def stop(self) -> None:
         """End the take; it is measured and saved."""
-        self.engine.ask(Stop())
+        self.engine.ask(Order.STOP)
 
     def upload(self, name: str, content: bytes) -> None:
         """Have a motion file prepared in a separate process.

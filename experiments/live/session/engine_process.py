@@ -3,7 +3,7 @@
 import os
 import queue
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,33 +12,27 @@ from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE, FAULT_VALUE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY
-from experiments.live.session.board import Board
 from experiments.live.session.engine import Drag, Engine
 from experiments.live.session.messages import (
     COURSE_POINTS,
     HELD,
     SHOWN,
     SLICE_SIDE,
+    Board,
     Build,
     Built,
     GoBack,
+    Order,
     Perform,
     Progress,
-    Quit,
-    Rearm,
     Record,
-    Redo,
     Refused,
-    Reset,
     Saved,
     SetGains,
-    Stop,
-    Undo,
 )
 from experiments.live.session.takes import Take
 from experiments.live.session.workers import PageProcess
-from experiments.setups.default_animation import default_poses
-from experiments.setups.session import Session
+from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from geometry.arrays import Array
 from models.errors import ModelError
@@ -49,9 +43,8 @@ from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 
-MIN_FRAME_INTERVAL = (
-    0.012  # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
-)
+# [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
+MIN_FRAME_INTERVAL = 0.012
 SLICE_INTERVAL = 0.25  # [s] between two computations of the field slice
 SLICE_WIDTH = 0.14  # [m] side of the slice
 IDLE_POLL_INTERVAL = 0.01  # [s] between two polls of the page while nothing runs
@@ -70,7 +63,7 @@ class EngineProcess(PageProcess):
 
     def close(self) -> None:
         """End the process; a take in progress is saved."""
-        self.ask(Quit())
+        self.ask(Order.QUIT)
         self._process.join(30.0)
         if self._process.is_alive():
             self._process.kill()
@@ -95,7 +88,7 @@ class _EngineLoop:
         self._curve_count, self._curve_changed = 0, True
 
     def run(self) -> None:
-        """Run until `Quit`, or until the page's process has ended."""
+        """Run until `Order.QUIT`, or until the page's process has ended."""
         origin, pace = time.perf_counter(), 1.0
         elapsed = 0.0
         while self._is_running and os.getppid() == self._parent:
@@ -150,7 +143,7 @@ class _EngineLoop:
     def _execute(self, order: object) -> None:
         if isinstance(order, Build):
             self._build(order)
-        elif isinstance(order, Quit):
+        elif order is Order.QUIT:
             self._is_running = False
         elif self._engine is not None:
             self._update_drag(self._engine)
@@ -158,24 +151,27 @@ class _EngineLoop:
             self._curve_changed = True
 
     def _execute_on_engine(self, order: object, engine: Engine) -> None:
-        actions: dict[type, Callable[[Any], Any]] = {
-            SetGains: lambda order: engine.set_gains(order.config),
-            Reset: lambda order: engine.reset(),
-            GoBack: lambda order: engine.back_to(order.t),
-            Undo: lambda order: engine.undo(),
-            Redo: lambda order: engine.redo(),
-            Perform: lambda order: engine.perform(order.now),
-            Rearm: lambda order: engine.rearm(),
-            Record: lambda order: self._record(order, engine),
-            Stop: lambda order: self._stop(engine),
-        }
-        if isinstance(order, Reset | GoBack):
+        if order in (Order.RESET, Order.STOP) or isinstance(order, GoBack | Record):
             self._stop(engine)  # a take must be continuous in time
-        actions[type(order)](order)
-
-    def _record(self, order: Record, engine: Engine) -> None:
-        self._stop(engine)
-        self._take = Take(order.folder, engine)
+        match order:
+            case SetGains(config):
+                engine.set_gains(config)
+            case GoBack(t):
+                engine.back_to(t)
+            case Perform(now):
+                engine.perform(now)
+            case Record(folder):
+                self._take = Take(folder, engine)
+            case Order.RESET:
+                engine.reset()
+            case Order.UNDO:
+                engine.undo()
+            case Order.REDO:
+                engine.redo()
+            case Order.REARM:
+                engine.rearm()
+            case _:
+                pass
 
     def _stop(self, engine: Engine) -> None:
         if self._take is None:

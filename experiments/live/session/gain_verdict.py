@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.governed import max_drag
-from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.largest_gains import MAX_STIFFNESS
+from controllers.certificates.loop.hand import MAX_STIFFNESS, HandRange
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River, critical_stiffness, lap_multipliers

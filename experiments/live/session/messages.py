@@ -1,10 +1,18 @@
-"""Messages between the page and the engine's process; values that change continuously are on shared boards."""
+"""Messages between the page and the engine's process, and the shared boards of values that change continuously."""
 
+import itertools
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from experiments.config.run_config import RunConfig
+from geometry.arrays import Array
 
 COURSE_POINTS = 241  # points at which the bent curve is drawn
 SLICE_SIDE = 9  # points along each side of the field's slice
@@ -22,6 +30,17 @@ HELD = {"grip": 1, "pressed": 1, "target": 3, "pace": 1, "paused": 1, "steps": 1
 """Rows of the page's board, with their sizes: grip, target and clock; ``steps`` counts the requested single steps."""
 
 
+class Order(Enum):
+    """Orders without content."""
+
+    RESET = "return to the beginning"
+    UNDO = "undo the last bend"
+    REDO = "redo the last undone bend"
+    REARM = "clear a latched fault"
+    STOP = "end the take"
+    QUIT = "end the process"
+
+
 @dataclass(frozen=True)
 class Build:
     """Build another run."""
@@ -37,25 +56,10 @@ class SetGains:
 
 
 @dataclass(frozen=True)
-class Reset:
-    """Return to the beginning."""
-
-
-@dataclass(frozen=True)
 class GoBack:
     """Go back to the last stored state at or before a time [s]."""
 
     t: float
-
-
-@dataclass(frozen=True)
-class Undo:
-    """Undo the last bend."""
-
-
-@dataclass(frozen=True)
-class Redo:
-    """Redo the last undone bend."""
 
 
 @dataclass(frozen=True)
@@ -66,25 +70,10 @@ class Perform:
 
 
 @dataclass(frozen=True)
-class Rearm:
-    """Clear a latched fault."""
-
-
-@dataclass(frozen=True)
 class Record:
     """Begin a take in a folder."""
 
     folder: Path
-
-
-@dataclass(frozen=True)
-class Stop:
-    """End the take."""
-
-
-@dataclass(frozen=True)
-class Quit:
-    """End the process."""
 
 
 @dataclass(frozen=True)
@@ -130,3 +119,56 @@ class Saved:
 
     folder: Path
     lines: tuple[str, ...]
+
+
+_MAX_RETRY_TIME = 1.0  # [s] of a reader; a write is much shorter
+
+
+class Board:
+    """Named rows of numbers in shared memory, with one writer.
+
+    A sequence lock: the sequence number is odd during a write, and a reader retries if the number was odd or
+    changed during the read (Lamport 1977, "Concurrent reading and writing").
+
+    Parameters
+    ----------
+    memory : ctypes array of double
+        Memory from `Board.memory`.
+    sizes : Mapping
+        Number of values of each row, by name.
+    """
+
+    def __init__(self, memory: Any, sizes: Mapping[str, int]):
+        self._values: Array = np.frombuffer(memory, dtype=np.float64)
+        starts = itertools.accumulate(sizes.values(), initial=1)
+        self.rows = {name: self._values[a : a + n] for (name, n), a in zip(sizes.items(), starts, strict=False)}
+
+    @staticmethod
+    def memory(sizes: Mapping[str, int]) -> Any:
+        """Memory for a board, to be passed to a process when it is started."""
+        from multiprocessing import get_context
+
+        return get_context("spawn").RawArray("d", 1 + sum(sizes.values()))
+
+    @property
+    def sequence(self) -> int:
+        """Sequence number, which changes with every write."""
+        return int(self._values[0])
+
+    def write(self, values: Mapping[str, npt.ArrayLike]) -> None:
+        """Write some rows; a value shorter than its row leaves the rest of the row unchanged."""
+        self._values[0] += 1.0
+        for name, value in values.items():
+            row = np.ravel(np.asarray(value, dtype=np.float64))
+            self.rows[name][: len(row)] = row
+        self._values[0] += 1.0
+
+    def read(self) -> dict[str, Array]:
+        """A consistent copy of all rows; if the writer died during a write, the rows as they are."""
+        end = time.monotonic() + _MAX_RETRY_TIME
+        while True:
+            before = self._values[0]
+            rows = {name: row.copy() for name, row in self.rows.items()}
+            if (before % 2.0 == 0.0 and before == self._values[0]) or time.monotonic() > end:
+                return rows
+            time.sleep(0.0)

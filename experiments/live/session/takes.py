@@ -15,10 +15,10 @@ from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
-from experiments.setups.default_animation import default_poses
+from experiments.setups.session import default_poses
 from sim.errors import SimError
 from sim.loop.channels import groups, record_into
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording

@@ -116,17 +116,7 @@ def verdicts(asked: Any, told: Any) -> None:
 
 
 class Uploaded(NamedTuple):
-    """Result of the preparation of a motion file.
-
-    Attributes
-    ----------
-    name : str
-        Name of the file.
-    path : Path or None
-        File of the clip; None if the preparation failed.
-    text : str
-        Result in one line.
-    """
+    """Result of preparing a motion file: its name, the file of the clip or None, and a line about it."""
 
     name: str
     path: Path | None

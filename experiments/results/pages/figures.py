@@ -8,7 +8,7 @@ root_error, residual, ground, flight and down. The recording has SI units and ra
 centimetres and degrees.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,11 @@ from matplotlib.patches import Circle
 
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
-from experiments.results.pages.arm_figure import arm_figure
 from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
+from sim.viewer.shown import courses
 
 POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
@@ -48,37 +47,33 @@ STYLE: dict[Any, Any] = PLAIN_STYLE | {
 }
 
 
-def draw_figures(recording: Recording, folder: Path) -> list[Path]:
-    """Draw all figures as PNG files into a folder, which is created if it is missing.
+def save_figures(
+    recording: Recording, folder: Path, drawings: Mapping[str, Callable[[Recording], Figure]]
+) -> list[Path]:
+    """Draw figures of a recording into a folder, created if it is missing; returns their PNG files."""
+    files = [folder / f"{name}.png" for name in drawings]
+    for file, draw in zip(files, drawings.values(), strict=True):
+        with mpl.rc_context(STYLE):
+            drawing = draw(recording)
+            folder.mkdir(parents=True, exist_ok=True)  # only now: a recording without rows leaves no folder
+            drawing.savefig(file, dpi=150)
+    return files
 
-    Returns
-    -------
-    list of Path
-        The files, in reading order.
+
+def draw_figures(recording: Recording, folder: Path) -> list[Path]:
+    """Draw the figures that all runs have as PNG files into a folder; returns the files, in reading order.
 
     Raises
     ------
     RecordingError
         If the recording lacks a channel that is drawn.
     """
-    files: list[Path] = []
     drawings: dict[str, Callable[[Recording], Figure]] = {
-        "path": path_figure,
-        "deviation": deviation_figure,
-        "forces": forces_figure,
-        "torques": torques_figure,
-    }
+        "path": path_figure, "deviation": deviation_figure, "forces": forces_figure, "torques": torques_figure,
+    }  # fmt: skip
     if "joint_error" in recording.groups["frames"]:
         drawings["figure"] = tracking_figure
-    if "tool" in recording.groups["frames"]:
-        drawings = {"arm": arm_figure, **drawings}
-    for name, draw in drawings.items():
-        with mpl.rc_context(STYLE):
-            drawing = draw(recording)
-            folder.mkdir(parents=True, exist_ok=True)  # only now: a recording without rows leaves no folder
-            files.append(folder / f"{name}.png")
-            drawing.savefig(files[-1], dpi=150)
-    return files
+    return save_figures(recording, folder, drawings)
 
 
 def path_figure(recording: Recording) -> Figure:

@@ -4,7 +4,6 @@ import html
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from experiments.files.html_page import html_page, image
 from experiments.results.folder import FIGURES, REPORT
-from experiments.results.pages.figures import AXES, STYLE, shade, thinned_rows
+from experiments.results.pages.figures import AXES, save_figures, shade, thinned_rows
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 
@@ -34,15 +33,8 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     lines : sequence of str
         What happened, one sentence per line.
     """
-    images: list[str] = []
-    figures = {"forces": forces_figure, "twin": twin_figure, "servo": servo_figure, "link": link_figure}
-    for name, draw in figures.items():
-        file = folder / FIGURES / f"{name}.png"
-        with mpl.rc_context(STYLE):
-            drawing = draw(recording)
-            file.parent.mkdir(exist_ok=True)  # only now: a recording without rows leaves no folder
-            drawing.savefig(file, dpi=150)
-        images.append(image(file, name))
+    drawings = {"forces": forces_figure, "twin": twin_figure, "servo": servo_figure, "link": link_figure}
+    images = (image(file, file.stem) for file in save_figures(recording, folder / FIGURES, drawings))
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     body = f"<ul>{items}</ul>{''.join(images)}"
     page = html_page(f"{recording.texts['title']}, on a device", body, _PAGE_STYLE)

@@ -42,7 +42,10 @@ def plots_html(recording: Recording) -> str:
         "plots": [
             {
                 "unit": plot.unit,
-                "lines": [{"name": n, "color": c, "y": _short_numbers(values)} for n, c, values in plot.lines]
+                "lines": [
+                    {"name": n, "color": c, "y": [float(f"{y:.4g}") for y in np.nan_to_num(values)]}
+                    for n, c, values in plot.lines
+                ],
             }
             for plot in plots
         ],
@@ -105,7 +108,3 @@ def _interval_maxima(values: Array) -> Array:
     if len(values) <= POINTS:
         return values
     return np.maximum.reduceat(values, np.linspace(0, len(values), POINTS, endpoint=False).astype(int))
-
-
-def _short_numbers(values: Array) -> list[float]:
-    return [float(f"{value:.4g}") for value in np.nan_to_num(values)]

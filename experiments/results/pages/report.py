@@ -1,17 +1,71 @@
-"""report.html, the page of a run in one self-contained file: summary in words, replay in 3D, plots and figures."""
+"""Figures of a run and its page, report.html: summary in words, replay in 3D, plots; also if it was interrupted."""
 
 import html
-from collections.abc import Sequence
+import json
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import cast
 
 import mujoco
+from matplotlib.figure import Figure
 
+from experiments.files.curve_files import CURVE_FILE, load_curve
 from experiments.files.html_page import html_page, image
+from experiments.results.folder import FIGURES, RECORDING, REPORT, SUMMARY, world_of
+from experiments.results.pages.figures import draw_figures, save_figures
+from experiments.results.pages.hardware_report import write_hardware_report
+from experiments.results.pages.mode_figures import arm_figure, lead_figure, stretch_figure
 from experiments.results.pages.plots import plots_html
+from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.viewer.courses import courses
 from sim.viewer.palette import FIELD, PUSH, USER
 from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
+from sim.viewer.shown import courses
+
+
+def write_report_of(folder: Path) -> None:
+    """Draw the figures and the page of a run from its recording.
+
+    Raises
+    ------
+    SimError
+        If it was recorded by an incompatible version of the program.
+    """
+    with Recording(folder / RECORDING) as recording:
+        if "frames" not in recording.groups:  # a hardware run, which has no figure in the loop
+            write_hardware_report(folder, recording, lines_of(recording, folder))
+            return
+        if "title" not in recording.texts:
+            raise SimError(
+                f"{recording.path}: lacks its title; it was recorded by another version of the program, "
+                "which can draw it, or run it again"
+            )
+        own: dict[str, Callable[[Recording], Figure]] = {}
+        if "tool" in recording.groups["frames"]:
+            own["arm"] = arm_figure
+        if (folder / CURVE_FILE).exists():
+            own["stretch"] = partial(stretch_figure, bent=load_curve(folder / CURVE_FILE))
+        if recording.texts["hand_does"] == "leads":
+            own["lead"] = lead_figure
+        figures = save_figures(recording, folder / FIGURES, own) + draw_figures(recording, folder / FIGURES)
+        title, lines = recording.texts["title"], lines_of(recording, folder)
+        write_report(folder / REPORT, recording, world_of(recording), title, lines, figures)
+
+
+def lines_of(recording: Recording, folder: Path) -> list[str]:
+    """Summary of a run in words: from its recording, or else from summary.json, with a remark if it was interrupted."""
+    if recording.summary is not None and "lines" in recording.summary:
+        return [str(line) for line in cast(list[object], recording.summary["lines"])]
+    # The recorder of a hardware run gets rows only; the summary is in the folder.
+    whole = recording.summary is not None
+    stopped = [] if whole else [f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."]
+    try:
+        found = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["lines"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return stopped
+    return [*stopped, *map(str, found)]
+
 
 _STYLE = """
 ul { margin: 0 0 1rem; padding-left: 1.2rem; }

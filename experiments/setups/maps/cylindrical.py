@@ -1,4 +1,4 @@
-"""Set-up of the cylindrical map: four clips at the corners of a hollow cylinder's cross-section."""
+"""Set-ups of two maps about a circle: four clips at a hollow cylinder's corners, and three that share the body."""
 
 from dataclasses import replace
 
@@ -6,20 +6,17 @@ import mujoco
 import numpy as np
 
 from controllers.blending.clip_arrays import clip_arrays
+from controllers.haptic_map.composite import Composite as CompositeMap
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
 from controllers.haptic_map.cylindrical import correction_shape
 from controllers.legs.limbs import Limb
-from experiments.config.maps import Cylindrical
-from experiments.config.run_config import RunConfig
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
 from experiments.fitting.blendable import keep_own_pace, same, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
-from experiments.fitting.similarity import arms, moves_alike
-from experiments.setups.maps.about_circle import about_circle, motions_of, out_of_step
-from experiments.setups.maps.place import Place, place_of
-from experiments.setups.modes.follow import flows_parallel
+from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
@@ -28,15 +25,8 @@ from sim.compilation.sources import results_folder
 CORNERS = 4  # number of clips
 
 
-def cylindrical_setup(
-    config: RunConfig, part: Cylindrical, clips: tuple[Clip, ...], figure: mujoco.MjModel
-) -> ClipMapParts:
-    """Map parts of a configured cylindrical map; see `cylindrical_parts`."""
-    return cylindrical_parts(clips, place_of(part), figure, flows_parallel(config))
-
-
 def cylindrical_parts(
-    clips: tuple[Clip, ...], place: Place, figure: mujoco.MjModel, parallel: bool = False
+    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
 ) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
 
@@ -85,3 +75,33 @@ def _cached_map(
     folder = results_folder(CylindricalMap.__module__)
     corrections = cached_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
     return CylindricalMap(clips, radii, heights, legs, corrections, lap)
+
+
+PARTS = 3  # number of clips
+
+
+def composite_parts(
+    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
+) -> ClipMapParts:
+    """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
+
+    `parallel` is as in `cylindrical_parts`.
+
+    Raises
+    ------
+    ControllerError
+        If there are no clips, or more than three, or they do not fit together.
+    """
+    lower, red, blue = motions_of(clips, PARTS, "composite")
+    legs, radii = figure_legs(figure), place.radii()
+    lap = place.curve.duration
+    apart = out_of_step(clips, 3, lap)
+    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
+
+    def refined() -> tuple[CompositeMap, tuple[str, ...]]:
+        if carries_alike(made, lap):
+            return made, ()
+        only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
+        return select_legs(lambda _: only, [clips[0].name], lap, parallel)
+
+    return replace(about_circle(place, made, clips, timing=0), refined=refined)

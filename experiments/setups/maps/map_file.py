@@ -15,9 +15,8 @@ from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.blendable import not_blendable
 from experiments.fitting.leg_choice import followed_map
 from experiments.fitting.similarity import arms
-from experiments.setups.maps.about_circle import about_circle
-from experiments.setups.maps.place import place_of
-from experiments.setups.modes.follow import flows_parallel
+from experiments.setups.maps.about_circle import about_circle, place_of
+from experiments.setups.modes.fixed_curve import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,
     best_transition,

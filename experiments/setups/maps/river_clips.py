@@ -16,8 +16,7 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
 from experiments.fitting.river_tour import not_followed
-from experiments.setups.maps.about_circle import about_circle, motions_of
-from experiments.setups.maps.place import place_of
+from experiments.setups.maps.about_circle import about_circle, motions_of, place_of
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip

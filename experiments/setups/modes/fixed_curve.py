@@ -1,23 +1,31 @@
-"""Parts common to the modes whose curve is not bent: the hand, the orientation moment, the governor and the walls."""
+"""Runs along a curve that is not bent: the parts common to their modes, and those of FOLLOW and the bunny."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from controllers.curves.trajectory import Trajectory
+from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
+from controllers.fields.bunny import Bunny as BunnyLaw
+from controllers.fields.follow import PACE_RANGE
+from controllers.fields.follow import Follow as FollowLaw
 from controllers.fields.orientation import Orientation
+from controllers.fields.soft_wall import SoftWall
+from controllers.haptic_map.base import HapticMap
 from controllers.safety.energy_tank import river_power
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import stylus_path
 from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.results.measures.run_measures import trace_summary
-from experiments.results.measures.summary import RunSummary
-from experiments.setups.parts.budget import tank_for
+from experiments.setups.parts.budget import fastest, tank_for
+from experiments.setups.parts.governor import governed
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
-from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
-from experiments.setups.parts.walls import figure_walls
+from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
+from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
 
 TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
@@ -79,20 +87,15 @@ def fixed_curve_parts(config: RunConfig, mode: Follow | Bunny | Rivers, maps: Cl
         notes=replace(field.notes, hand_does="traces") if traces else field.notes, gains=maps.gains,
         argument_at=lambda nearest, phases: stylus_path(nearest), handled=handling_spans(user),
         remarks=turning_remark(user, maps.oriented) + late_remark(user, config.seconds),
-        summarise=_add_trace if traces else lambda summary, of: summary,
+        summarise=lambda summary, of: replace(summary, trace=trace_summary(of.recording)) if traces else summary,
     )  # fmt: skip
-
-
-def _add_trace(summary: RunSummary, of: Measuring) -> RunSummary:
-    return replace(summary, trace=trace_summary(of.recording))
 
 
 def with_walls(program: Program, walls: JointWalls | None, maps: ClipMapParts) -> Program:
     """A field, plus the soft walls of the figure's joints if the run has them."""
     if walls is None:
         return program
-    made = figure_walls(maps.whole_map, walls.wall_stiffness, walls.wall_margin, walls.joint_speed)
-    return program + made.program()
+    return program + figure_walls(maps.whole_map, walls).program()
 
 
 def with_moment(program: Program, moment: OrientationMoment | None, course: Trajectory, tube: float) -> Program:
@@ -107,3 +110,62 @@ def with_moment(program: Program, moment: OrientationMoment | None, course: Traj
         return program
     law = Orientation(course, moment.orientation_stiffness, moment.orientation_damping, tube)
     return program + law.program()
+
+
+DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
+
+
+def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
+    """A field that repels the hand from the limits of the figure's joints and of their speeds.
+
+    Raises
+    ------
+    ParameterError
+        If a number is out of its interval.
+    """
+    margin, speed = walls.wall_margin, walls.joint_speed
+    n, narrowest = len(JOINTS), float(np.diff(joint_range(), axis=2).min())
+    if margin > 0.5 * narrowest:
+        raise ParameterError(
+            f"--wall-margin is {margin:g} rad; expected at most {np.floor(500.0 * narrowest) / 1e3:g} rad, half of the "
+            "narrowest range"
+        )
+    columns, rows = range(N_POSE - 4 * n, N_POSE, 4), range(N_TANGENT - 3 * n, N_TANGENT, 3)
+    return SoftWall(
+        haptic_map, tuple(columns), tuple(rows), tuple(joint_range()), walls.wall_stiffness, margin, DAMPING, speed
+    )
+
+
+def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "follow"."""
+    parallel = mode.flow == "parallel"
+    # With a parallel flow a hand that runs outside a bend needs no course that is faster there.
+    course = maps.course(mode.damping, 0.0 if parallel else mode.stiffness)
+    law = FollowLaw(course, mode.stiffness, mode.damping, mode.tube, parallel)
+    law, urged = governed(mode.governor, law, course, maps)
+    power = river_power(mode.damping, (PACE_RANGE[1] if parallel else 1.0) * fastest(course))
+    springs = ((mode.stiffness, mode.tube),)
+    field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
+    return fixed_curve_parts(config, mode, maps, field)
+
+
+def flows_parallel(config: RunConfig) -> bool:
+    """Whether the field keeps the pace of a hand that is pushed off its curve."""
+    return isinstance(config.mode, Follow) and config.mode.flow == "parallel"
+
+
+def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:
+    """Parts of a run in the mode "bunny".
+
+    Besides its damper, the moving spring injects at most min(k_r δ e^{-1/2}, F_p) |φ̇|, with the limiter's peak F_p.
+    """
+    course, width = maps.curve, mode.bunny_width
+    bunny = BunnyLaw(course, mode.stiffness, mode.damping, width, mode.bunny_attraction, mode.bunny_pace)
+    law, urged = governed(mode.governor, bunny, course, maps)
+    pace, force = fastest(course), ForceLimiter(config.clock.servo_period).peak
+    power = river_power(mode.damping, pace) + pace * min(mode.stiffness * width * np.exp(-0.5), force)
+    # The attractor's potential, ∫ k s exp(−s²/2δ²) ds = k δ², is the energy of a linear spring of reach √2 δ.
+    springs = ((mode.stiffness, np.sqrt(2.0) * width),)
+    return fixed_curve_parts(
+        config, mode, maps, FixedField(law, course, power, springs, Notes("BUNNY", maps.reach), urged)
+    )

@@ -26,9 +26,8 @@ ADMISSION, HYSTERESIS = 1.2, 0.15
 # [m/s] least hysteresis of rivers that cross, that of the encoders' noise: with less of it a push out of a river at
 # 32 mm/s changes over 20 times in 0.3 s instead of once (docs/validation/crossing-rivers.md).
 LEAST_HYSTERESIS = 0.01
-SIDE_BY_SIDE_HYSTERESIS = (
-    0.05  # hysteresis over speed of rivers side by side, as on a lifted map: position tells them apart
-)
+# hysteresis over speed of rivers side by side, as on a lifted map: position tells them apart
+SIDE_BY_SIDE_HYSTERESIS = 0.05
 # In the smooth form σ sets the angle up to which rivers are blended. A blend of diverging tubes throws the hand out of
 # both: with 0.05 blending ends at 20°, before the middle between the tubes lies outside them.
 SIGMA = {"discrete": 0.15, "smooth": 0.05}

@@ -39,16 +39,12 @@ def tank_for(power: float, springs: Sequence[tuple[float, float]], start: float,
         Bounds the force of the device.
     """
     stores = (
-        sum(_spring_energy(spring, most, limiter.peak) for spring in springs) for most in (WORKSPACE_WIDTH, start)
+        sum(spring_store(stiffness, min(reach, most), limiter.peak) for stiffness, reach in springs)
+        for most in (WORKSPACE_WIDTH, start)
     )
     power, capacity, initial = (max(number, _MIN_BUDGET) for number in (power, *stores))
     drain_time = max(EnergyTank.drain_time, 2.0 * limiter.period)  # two periods are the least that a tank accepts
     return EnergyTank(limiter.period, power, capacity, drain_time, initial)
-
-
-def _spring_energy(spring: tuple[float, float], most: float, force: float) -> float:
-    stiffness, reach = spring
-    return spring_store(stiffness, min(reach, most), force)
 
 
 def fastest(curve: Trajectory) -> float:

@@ -9,11 +9,7 @@ from sim.users.hand.actions import Turn
 
 # Share of the stylus's rotation about x (roll), y (pitch) and z (yaw) that each joint takes. In pitch and yaw the
 # shares add up to 1, so gaze follows one to one, with a leading trunk as in people; roll leans the trunk only.
-GAINS = {
-    "abdomen": (0.3, 0.2, 0.1),
-    "chest": (0.3, 0.2, 0.2),
-    "head": (0.0, 0.6, 0.7),
-}
+GAINS = {"abdomen": (0.3, 0.2, 0.1), "chest": (0.3, 0.2, 0.2), "head": (0.0, 0.6, 0.7)}
 LAP_ANGLE = 0.7  # angle by which the default hand turns the stylus, twice a lap [rad]
 JOINT_MARGIN = np.deg2rad(3.0)  # kept from the joints' limits, since rotations about different axes do not quite add
 

@@ -10,18 +10,7 @@ from experiments.setups.parts.expression import lap_turns
 from geometry.arrays import Array
 from sim.users.hand.actions import Grab, Push
 from sim.users.hand.arm import Arm
-from sim.users.intents import (
-    Bend,
-    ChangeOver,
-    CutCorner,
-    Exaggerate,
-    GetLost,
-    Own,
-    Press,
-    Relax,
-    Resist,
-    Trace,
-)
+from sim.users.intents import Bend, ChangeOver, CutCorner, Exaggerate, GetLost, Own, Press, Relax, Resist, Trace
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
@@ -30,12 +19,10 @@ PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' co
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
-PUSH_START_DISTANCE = (
-    3e-3  # [m] distance from its place within which a push into another river begins: a fifth of a tube
-)
-MIN_PUSHED_RIVER_SPEED = (
-    0.0235  # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
-)
+# [m] distance from its place within which a push into another river begins: a fifth of a tube
+PUSH_START_DISTANCE = 3e-3
+# [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
+MIN_PUSHED_RIVER_SPEED = 0.0235
 PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 TRACE_SAMPLE_TIME = 0.01  # [s] between samples of a path that the hand traces
 
@@ -52,13 +39,7 @@ _MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
 
 
 class Beginning(NamedTuple):
-    """Position, velocity and acceleration of the stylus when a run begins, in H.
-
-    Attributes
-    ----------
-    point, velocity, acceleration : Array
-        [m], [m/s], [m/s²], shape (3,).
-    """
+    """Position [m], velocity [m/s] and acceleration [m/s²] of the stylus when a run begins, in H, shapes (3,)."""
 
     point: Array
     velocity: Array
@@ -205,10 +186,7 @@ def edited_until(grabs: tuple[Grab, ...]) -> float:
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
     """A push outwards and one inwards, of peak `force` [N], in the lap that begins at `start` [s]."""
-    return (
-        Push(start + 0.1 * lap, 0.3 * lap, force),
-        Push(start + 0.6 * lap, 0.3 * lap, -force),
-    )
+    return (Push(start + 0.1 * lap, 0.3 * lap, force), Push(start + 0.6 * lap, 0.3 * lap, -force))
 
 
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:

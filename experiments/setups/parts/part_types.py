@@ -34,37 +34,20 @@ Static = Mapping[str, npt.ArrayLike | str]
 
 
 class Settings(Protocol):
-    """Settings of a run apart from field, map and hand: figure, device, rates, seed and scene."""
+    """Settings of a run apart from field, map and hand; `body` is what follows the hand, `scene` the world."""
 
     @property
-    def figure(self) -> Figure:
-        """The figure."""
-        ...
-
+    def figure(self) -> Figure: ...  # noqa: D102
     @property
-    def device(self) -> Phantom | Replay:
-        """The device."""
-        ...
-
+    def device(self) -> Phantom | Replay: ...  # noqa: D102
     @property
-    def clock(self) -> Clock:
-        """Rates of servo and physics."""
-        ...
-
+    def clock(self) -> Clock: ...  # noqa: D102
     @property
-    def seed(self) -> int:
-        """Seed of the stylus's exact start position."""
-        ...
-
+    def seed(self) -> int: ...  # noqa: D102
     @property
-    def body(self) -> BodyKind:
-        """What follows the hand."""
-        ...
-
+    def body(self) -> BodyKind: ...  # noqa: D102
     @property
-    def scene(self) -> SceneConfig:
-        """Configuration of the simulated world."""
-        ...
+    def scene(self) -> SceneConfig: ...  # noqa: D102
 
 
 class RiverChoice(NamedTuple):
@@ -225,7 +208,7 @@ class Measuring(NamedTuple):
     recording : Recording
         Recording of the run.
     default_poses : callable
-        Makes a function for the animation of the unedited curve (`default_animation.default_poses`).
+        Makes a function for the animation of the unedited curve (`session.default_poses`).
     handled : tuple of (float, float)
         Intervals of time [s] in which the hand does something other than push.
     memory, walkers : Array

@@ -6,23 +6,14 @@ from typing import Any, NamedTuple
 
 from experiments.results.folder import RECORDING, world_of
 from experiments.trials.design.plan import Trial
-from experiments.trials.trial.measures import MEASURES
+from experiments.trials.trial.measures import MEASURES, TrialLog
 from experiments.trials.trial.run_trial import MapCache, run_recorded
-from experiments.trials.trial.trial_log import TrialLog
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
 
 
 class Replay(NamedTuple):
-    """Replay of a trial.
-
-    Attributes
-    ----------
-    title : str
-        Which trial it is, and why it is shown.
-    page : str
-        The replay, a complete HTML document.
-    """
+    """Replay of a trial: which one it is and why it is shown, and the replay, a complete HTML document."""
 
     title: str
     page: str

@@ -24,10 +24,12 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     """
     factor = next(iter(study.factors))
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
+    people = "One simulated person" if study.users.number == 1 else f"{study.users.number} simulated people"
+    times = {1: "once", 2: "twice"}.get(study.repetitions, f"{study.repetitions} times")
     outcome = "all of which came to their end" if not failed else f"of which {failed} failed"
     first = (
-        f"{_people(study.users.number)} met {counts} conditions ({', '.join(study.factors)}), "
-        f"{_times(study.repetitions)} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
+        f"{people} met {counts} conditions ({', '.join(study.factors)}), "
+        f"{times} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."
     )
     ease, cost = (
         _answer(found.of(measure, factor), measure, factor, _missing_reason(frame, measure))
@@ -76,11 +78,3 @@ def _comparison(c: Contrast) -> str:
 
 def _format_number(value: float) -> str:
     return f"{value:.3g}"
-
-
-def _people(count: int) -> str:
-    return "One simulated person" if count == 1 else f"{count} simulated people"
-
-
-def _times(count: int) -> str:
-    return {1: "once", 2: "twice"}.get(count, f"{count} times")

@@ -181,7 +181,7 @@ def _contrast(cells: Any, names: tuple[str, str, str, str], between: bool, rng: 
         return None
     return Contrast(
         measure, factor, level, reference, users, float(one.mean()), float(other.mean()), float(_difference(*samples)),
-        *_bootstrap_interval(samples, rng), *_difference_range(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
+        *bootstrap_interval(samples, rng), *_difference_range(table, level, reference), *NO_FIT[:4], p_holm=np.nan,
         effect=effect, agree=agree,
     )  # fmt: skip
 
@@ -193,10 +193,12 @@ def _difference_range(table: Any, level: str, reference: str) -> tuple[float, fl
     return float(np.min(differences)), float(np.max(differences))
 
 
-def _bootstrap_interval(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
+def bootstrap_interval(samples: tuple[Array, ...], rng: np.random.Generator) -> tuple[float, float]:
+    """BCa bootstrap interval of a mean, or of the difference of two; NaN for few samples, all alike, or infinite."""
     from scipy.stats import bootstrap
 
-    if not (all(len(sample) > 2 for sample in samples) and any(map(has_spread, samples))):
+    finite = all(len(sample) > 2 and np.all(np.isfinite(sample)) for sample in samples)
+    if not (finite and any(map(has_spread, samples))):
         return float("nan"), float("nan")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN, and is shown so

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import Trial
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
 from experiments.trials.trial.run_trial import Row
 

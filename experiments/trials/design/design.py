@@ -5,23 +5,14 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import StudyConfig, Words, check_trials
+from experiments.trials.design.study_config import StudyConfig, StudyError, Words, check_trials
 from experiments.trials.trial.measures import MEASURES
 
 _COLUMNS = ("key", "user", "repetition", "position", "seed", "state", "reason", *MEASURES)  # columns of the table
 
 
 class Condition(NamedTuple):
-    """A combination of one level of every factor.
-
-    Attributes
-    ----------
-    levels : dict
-        Name of the level by name of the factor.
-    words : Words
-        Parameters of a run that the levels set.
-    """
+    """Levels of all factors, by name of the factor, and the parameters of a run that they set."""
 
     levels: dict[str, str]
     words: Words

@@ -19,8 +19,7 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.design import Condition, DesignTrial, conditions, design_trials
-from experiments.trials.design.errors import StudyError
-from experiments.trials.design.study_config import StudyConfig, Words
+from experiments.trials.design.study_config import StudyConfig, StudyError, Words
 from models.mocap.library import embedded_names
 from sim.compilation.sources import reached_code
 from sim.users.person.person import Person
@@ -63,15 +62,12 @@ def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
     for meeting in design_trials(study):
         base = bases[meeting.number]
         user = replace(base.user, person=people[meeting.user])
-        config = replace(base, user=user, seed=trial_seed(study.seed, meeting))
+        # Independent of other trials' seeds, and of the numbers of users and repetitions.
+        entropy = (study.seed, meeting.user, meeting.number, meeting.repetition)
+        seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
+        config = replace(base, user=user, seed=seed)
         trials.append(Trial(trial_key(config), meeting, config))
     return tuple(trials)
-
-
-def trial_seed(seed: int, meeting: DesignTrial) -> int:
-    """Seed of a trial, independent of other trials' seeds and of the numbers of users and repetitions."""
-    entropy = (seed, meeting.user, meeting.number, meeting.repetition)
-    return int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
 
 
 def trial_key(config: RunConfig) -> str:

@@ -9,7 +9,12 @@ from typing import Any, Literal, cast
 from pydantic import Field
 
 from experiments.config.part import above, from_dict, part, whole_number
-from experiments.trials.design.errors import StudyError
+from sim.errors import SimError
+
+
+class StudyError(SimError):
+    """A study that cannot be planned, run, continued or read; the message names it and says what to do."""
+
 
 MAX_TRIALS = 1_000_000
 """Maximum number of trials of a study or a tuning: the number of people in the largest population."""

@@ -8,16 +8,14 @@ from typing import Any
 
 from experiments.config.part import from_json
 from experiments.config.run_config import RunConfig
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import trial_key
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.run_trial import Row, Task, perform_trial
 
-TASKS_PER_THREAD = (
-    3  # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
-)
-MAX_WORKER_DEATHS = (
-    50  # number of workers that die while running the same trial before the trial is taken to be the cause
-)
+# tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
+TASKS_PER_THREAD = 3
+# number of workers that die while running the same trial before the trial is taken to be the cause
+MAX_WORKER_DEATHS = 50
 MAX_START_ATTEMPTS = 5  # attempts to start a local cluster, as a worker may be killed while it starts
 _LOCAL_TIMEOUT = "120s"  # timeout of local connections; processes on a busy machine may have to wait
 _MAX_WAIT = "30s"  # timeout for a scheduler to answer, and for its first worker

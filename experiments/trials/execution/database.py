@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.run_trial import Row
 
 SCHEMA = 1

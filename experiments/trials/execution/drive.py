@@ -12,8 +12,9 @@ from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.trials.design.plan import Trial
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
-from experiments.trials.trial.run_trial import MapCache, Row, Task
+from experiments.trials.trial.run_trial import MAP_CACHE, Row, Task
 
 
 class Executor(Protocol):
@@ -31,16 +32,41 @@ class _RateColumn(ProgressColumn):
         return Text(f"{60.0 * (task.finished_speed or task.speed or 0.0):.0f}/min")
 
 
-def compile_and_make_maps(configs: Iterable[RunConfig], shelf: MapCache, console: Console) -> None:
+def compile_and_make_maps(configs: Iterable[RunConfig], console: Console) -> None:
     """Compile the units that trials need, once for each kind of run, and make their maps."""
     for config in {_compilation_key(config): config for config in configs}.values():
-        shelf.session(config, compiler(console))
+        MAP_CACHE.session(config, compiler(console))
 
 
 def _compilation_key(config: RunConfig) -> object:
     """Key of the settings that determine which compiled units and which map a run needs."""
     options = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
     return config.mode.kind, options, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+
+
+_PROBE_FILE = ".hvf"
+
+
+def check_writable(url: str) -> None:
+    """Write an empty file to a folder or URL, and remove it again.
+
+    Raises
+    ------
+    StudyError
+        If nothing can be written there.
+    """
+    try:
+        import fsspec
+
+        system, path = fsspec.core.url_to_fs(url)
+        system.makedirs(path, exist_ok=True)
+        system.pipe_file(f"{path}/{_PROBE_FILE}", b"")
+        system.rm_file(f"{path}/{_PROBE_FILE}")
+    except Exception as error:  # every storage backend has its own exceptions
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise StudyError(
+            f"recordings = {url!r}: {reason}; expected a folder, or a URL that fsspec can write to"
+        ) from None
 
 
 def run_missing(

@@ -15,12 +15,59 @@ from experiments.config.run_config import PERSON_INTENTS, RunConfig
 from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
 from experiments.results.measures.run_measures import SETTLING
 from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
-from experiments.setups.default_animation import default_poses
-from experiments.setups.session import Session
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.setups.session import Session, default_poses
 from geometry.arrays import Array, Mask
 from sim.body.falls import UP
+from sim.body.figure_state import FigureState
 from sim.body.residual import MIN_GROUND_FORCE
+from sim.loop.channels import frame_channels, tick_channels
+from sim.loop.servo import FrameLog, Servo, TickLog
+from sim.world.world import World
+
+_TICK_CHANNELS = ("t", "p", "v", "user", "force", "phase", "nearest", "distance", "river", "fault")
+
+
+class TrialLog:
+    """An observer of a `Loop` that keeps the channels that measures need.
+
+    Attributes
+    ----------
+    ticks, frames : dict of str to Array
+        Data by channel, with the names of `sim.loop.channels.groups`; `frames` is empty without a figure, and has no
+        errors and forces for a kinematic figure.
+    """
+
+    def __init__(self, servo: Servo, world: World):
+        self._ticks_per_frame, self._pose_at = servo.figure_ticks, world.pose_at
+        self._is_physical, self._has_figure = isinstance(servo.figure, FigureState), world.has_figure
+        self._tick_blocks: dict[str, list[Array]] = {name: [] for name in _TICK_CHANNELS}
+        self._frame_blocks: dict[str, list[Array]] = {}
+
+    def __call__(self, ticks: TickLog, frames: FrameLog, n: int) -> None:
+        """Add a block."""
+        channels = tick_channels(ticks, n)
+        for name, blocks in self._tick_blocks.items():
+            blocks.append(channels[name].copy())
+        if not self._has_figure:
+            return
+        n_frames = -(-n // self._ticks_per_frame)
+        figure_channels = {"t": frames.t[:n_frames], "reference": frames.reference[:n_frames]}
+        if self._is_physical:
+            figure_channels = frame_channels(frames, n_frames, self._pose_at)
+            del figure_channels["qpos"]
+        for name, block in figure_channels.items():
+            self._frame_blocks.setdefault(name, []).append(block.copy())
+
+    @property
+    def ticks(self) -> dict[str, Array]:
+        """Channels at the rate of the servo."""
+        return {name: np.concatenate(blocks) for name, blocks in self._tick_blocks.items()}
+
+    @property
+    def frames(self) -> dict[str, Array]:
+        """Channels at the rate of the figure's control; none without a figure."""
+        return {name: np.concatenate(blocks) for name, blocks in self._frame_blocks.items()}
+
 
 COMPARISON_RATE = 25.0  # [Hz] at which animations are compared: about what the eye resolves
 _NAN = float("nan")

@@ -5,12 +5,10 @@ import platform
 import tempfile
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import mujoco
 from llvmlite.binding import get_host_cpu_name
 
 from experiments.config.maps import Composite, Cylindrical
@@ -20,9 +18,7 @@ from experiments.results.folder import RECORDING
 from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
-from experiments.trials.trial.measures import measure_trial
-from experiments.trials.trial.trial_log import TrialLog
-from models.mocap.motion.clip import Clip
+from experiments.trials.trial.measures import TrialLog, measure_trial
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
@@ -31,17 +27,7 @@ State = Literal["done", "failed"]
 
 
 class Task(NamedTuple):
-    """A trial as it is given to a worker.
-
-    Attributes
-    ----------
-    key : str
-        Key of the trial.
-    config : str
-        Configuration of the trial, as JSON.
-    recordings : str
-        Folder or URL for its recording; empty for none.
-    """
+    """A trial for a worker: key, configuration as JSON, and folder or URL for its recording, or empty."""
 
     key: str
     config: str
@@ -98,10 +84,7 @@ class MapCache:
                     session = wire(config, ready=ready)
                     # The map was already refined when this session was assembled.
                     self._maps[key] = replace(session.parts.maps, refined=None)
-        return wire(config, ready=ready, maps_of=self._map_maker(key))
-
-    def _map_maker(self, key: object) -> Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts[Any]]:
-        return lambda config, figure, clips: self._maps[key]
+        return wire(config, ready=ready, maps_of=lambda config, figure, clips: self._maps[key])
 
 
 def _map_key(config: RunConfig) -> object:

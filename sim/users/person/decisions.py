@@ -40,9 +40,8 @@ from sim.users.person.wishes import GRIP as WISHED_GRIP
 ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] time constant with which a relaxed arm's rest position follows the hand
 RETAINED = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
-DIFFERENCE_HALF_WIDTH = (
-    0.1  # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
-)
+# [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
+DIFFERENCE_HALF_WIDTH = 0.1
 
 
 @njit

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from experiments.files import atomic_file as whole
-from experiments.files.atomic_file import atomic_file
 from experiments.files.device_files import save_device
 from experiments.files.map_files import write_arrays
-from experiments.lifting import lift_file
+from experiments.lifting import lift_report
+from sim.compilation import whole_files as whole
+from sim.compilation.whole_files import atomic_file
 
 
 def test_file_appears_only_once_closed(tmp_path: Path) -> None:
@@ -77,10 +77,10 @@ def test_interrupted_lift_leaves_no_file(
     def nothing(*_: object) -> None:
         return None
 
-    monkeypatch.setattr(lift_file, "lift_clips", nothing)
-    monkeypatch.setattr(lift_file, "report_lift", interrupted)
+    monkeypatch.setattr(lift_report, "lift_clips", nothing)
+    monkeypatch.setattr(lift_report, "report_lift", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        lift_file.lift_into(["walk"], tmp_path / "maps" / "map.npz")
+        lift_report.lift_into(["walk"], tmp_path / "maps" / "map.npz")
     assert main(["lift", "walk", "--out", str(tmp_path / "map.npz")]) == 130
     assert capsys.readouterr().err.strip() == "hvf: stopped; no partial files are left"
     assert not list(tmp_path.iterdir())

@@ -8,8 +8,15 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, in_between, lap_times, measure_map
-from experiments.lifting.motion_measure import measure_motion
+from experiments.lifting.map_quality import (
+    SAMPLES,
+    Layout,
+    body_weights,
+    in_between,
+    lap_times,
+    measure_map,
+    measure_motion,
+)
 from models.humanoid.skeleton import JOINTS, N_TANGENT, figure_model, joint_range, rest_pose
 from models.mocap.motion.clip import Clip
 

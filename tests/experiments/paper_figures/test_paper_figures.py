@@ -54,7 +54,7 @@ def test_all_eight_figures_are_written_as_pdf_and_png(tmp_path: Path, monkeypatc
         pytest.skip(str(error))
     monkeypatch.setattr("experiments.paper_figures.draw.DPI", 60)
     # Faster: no report pages, and kinematic figures.
-    monkeypatch.setattr("experiments.results.pages.report_of.write_report", lambda *_: None)
+    monkeypatch.setattr("experiments.results.pages.report.write_report", lambda *_: None)
     kinematic = {name: replace(config, figure=Figure(kind="kinematic")) for name, config in configs().items()}
     monkeypatch.setattr("experiments.paper_figures.draw.configs", lambda: kinematic)
     files = draw_all(tmp_path, time.perf_counter())

@@ -17,7 +17,7 @@ from experiments.files.json_text import json_text
 from experiments.render.film import Film, Frames, Show, render
 from experiments.render.film_file import FilmFile, check_target
 from experiments.render.graphics import NoGraphics, offscreen_backend
-from experiments.render.lowest_point import lowest_point, seen_geoms
+from experiments.render.scenes import lowest_point, seen_geoms
 from experiments.render.shown_world import GHOST
 from experiments.render.timeline import Ghost
 from models.humanoid.skeleton import N_POSE, rest_pose

@@ -6,7 +6,7 @@ import pytest
 import trimesh
 from mjviser.conversions import create_primitive_mesh
 
-from experiments.render.lowest_point import lowest_point, seen_geoms
+from experiments.render.scenes import lowest_point, seen_geoms
 from models.humanoid.skeleton import figure_model, rest_pose
 
 _GEOMS = {

@@ -13,7 +13,7 @@ from experiments.config.run_config import RunConfig
 from experiments.fitting.similarity import motion_at
 from experiments.fitting.verdict import motion_of
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from models.mocap.library import embedded
 from sim.body.tracking import TrackingConfig, track
 from sim.loop.loop import Loop

@@ -60,7 +60,7 @@ def test_lost_scheduler_is_one_line_and_the_study_resumes(tmp_path: Path) -> Non
 
 
 def test_missing_scheduler_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from experiments.trials.design.errors import StudyError
+    from experiments.trials.design.study_config import StudyError
     from experiments.trials.execution import cluster
 
     monkeypatch.setattr(cluster, "_MAX_WAIT", "1s")
@@ -71,7 +71,7 @@ def test_missing_scheduler_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_worker_with_other_code_or_files_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from experiments.config.options import run_config
     from experiments.config.part import to_json
-    from experiments.trials.design.errors import StudyError
+    from experiments.trials.design.study_config import StudyError
     from experiments.trials.execution.cluster import perform_on_worker
     from experiments.trials.trial.run_trial import Task
 

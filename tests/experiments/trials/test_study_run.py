@@ -9,7 +9,7 @@ import pytest
 from controllers.errors import ParameterError
 from experiments.config.part import to_json
 from experiments.results.measures import smoothness
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from experiments.trials.trial import run_trial

@@ -15,15 +15,14 @@ from controllers.errors import ParameterError
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.config.options import run_config
 from experiments.config.run_config import load_config
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
-from experiments.trials.execution.threads import Threads
+from experiments.trials.execution.executors import Threads
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
-from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, violation_of
-from experiments.tuning.storage import storage_of
+from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, storage_of, violation_of
 from experiments.tuning.tune import TunedSimulation
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning

@@ -28,8 +28,7 @@ from sim.compilation import kernel_units
 from sim.compilation.kernel_units import law_units, linked_stages
 from sim.compilation.unit_cache import cache_folder
 from sim.compilation.units import Unit
-from sim.reference.map_derivative import map_derivative
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_derivative, poses_along
 
 ARM = default_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()

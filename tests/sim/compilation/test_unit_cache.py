@@ -14,6 +14,7 @@ from numba import njit
 from sim.compilation import unit_cache
 from sim.compilation.compiled import entry_point
 from sim.compilation.unit_cache import is_sound, remove_forgotten
+from sim.compilation.whole_files import read_hashed, write_hashed
 
 ROOT = Path(unit_cache.__file__).parent.parent
 TOYS = Path(__file__).parent / "toy_kernels.py"
@@ -74,7 +75,7 @@ def test_damaged_file_is_recompiled(folder: Path, damage: bytes | None):
 def test_intact_file_without_a_unit_is_recompiled(folder: Path):
     _kernel(2.0)(4.0)
     (path,) = folder.glob("*.unit")
-    unit_cache._write(path, b"no pickle")
+    write_hashed(path, b"no pickle")
     assert _kernel(2.0)(4.0) == 8.0
 
 
@@ -87,9 +88,9 @@ def test_unwritable_cache_folder_is_tolerated(tmp_path: Path, monkeypatch: pytes
 def test_concurrent_writers_leave_one_intact_file(tmp_path: Path):
     path, contents = tmp_path / "a.unit", [bytes([i]) * 100_000 for i in range(32)]
     with ThreadPoolExecutor(8) as pool:
-        list(pool.map(lambda content: unit_cache._write(path, content), contents))
+        list(pool.map(lambda content: write_hashed(path, content), contents))
         assert all(pool.map(is_sound, [path] * 32))
-    assert unit_cache._read(path) in contents
+    assert read_hashed(path) in contents
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from experiments.config.options import run_config
 from experiments.config.part import to_dict
-from experiments.results.pages.report_of import write_report_of
+from experiments.results.pages.report import write_report_of
 from experiments.runs.run import record, write_animations
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire

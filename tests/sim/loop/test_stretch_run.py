@@ -13,7 +13,7 @@ from experiments.config.modes import Stretch
 from experiments.config.options import run_config
 from experiments.files.curve_files import CURVE_FILE, load_curve, save_curve
 from experiments.results.measures.stretch_summary import stretch_summary
-from experiments.results.pages.stretch_figure import draw_stretch
+from experiments.results.pages.mode_figures import stretch_figure
 from experiments.setups.modes.stretch import stretch_grabs, stretch_parts
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
@@ -117,7 +117,7 @@ def test_bent_curve_is_saved_loaded_and_drawn(stretch_run, tmp_path) -> None:
         recorder.append("ticks", {name: recorded["p"] if name == "p" else np.zeros((len(recorded["p"]), *shape))
                                   for name, shape in names.items()})  # fmt: skip
     with Recording(tmp_path / "run.h5") as recording:
-        draw_stretch(recording, tmp_path, tmp_path / "stretch.png")
+        stretch_figure(recording, loaded).savefig(tmp_path / "stretch.png", dpi=150)
     image = matplotlib.image.imread(tmp_path / "stretch.png")
     green = (image[..., 1] > image[..., 0] + 0.2) & (image[..., 1] > image[..., 2] + 0.2)
     assert green.sum() > 1000  # the bent curve, drawn twice

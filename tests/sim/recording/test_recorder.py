@@ -223,7 +223,7 @@ def test_memory_does_not_grow_with_the_run(tmp_path):
 import sys
 from pathlib import Path
 import numpy as np
-from sim.loop.memory import peak_memory_mb
+from sim.loop.loop import peak_memory_mb
 from sim.recording.recorder import Group, Recorder
 n = 250
 with Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, {"x": (100,)})}, {}) as recorder:

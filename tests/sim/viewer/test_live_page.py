@@ -5,12 +5,10 @@ import numpy as np
 import pytest
 
 from models.world.scene import SceneConfig, world_model
-from sim.viewer.courses import courses
 from sim.viewer.live_page import LivePage
 from sim.viewer.live_stage import METRES_PER_NEWTON, drawn_at, workspace_position
-from sim.viewer.page import NullPage
 from sim.viewer.shapes import body_shapes, simplify_shapes
-from sim.viewer.shown import Moment
+from sim.viewer.shown import Moment, courses
 
 ANGLE = np.linspace(0, 6, 30)
 CURVES = 0.05 * np.stack([np.column_stack([np.cos(ANGLE), np.sin(ANGLE), k * np.ones(30)]) for k in range(2)])
@@ -96,7 +94,6 @@ def test_showing_a_state_leaves_the_model_unchanged():
     model = world_model(SceneConfig())
     before = model.qpos0.copy(), model.body_pos.copy(), model.geom_rgba.copy()
     data = mujoco.MjData(model)
-    NullPage().show(shown_state(model))
     page = LivePage(model, DRAWN, 0.02, port=0)
     page.show(shown_state(model)._replace(qpos=data.qpos + 0.1))
     page.close()

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.results.pages.report_of import write_report_of
+from experiments.results.pages.report import write_report_of
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import RecordingError
 

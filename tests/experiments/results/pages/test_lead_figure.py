@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from experiments.results.pages.figures import STYLE
-from experiments.results.pages.lead_figure import lead_figure
+from experiments.results.pages.mode_figures import lead_figure
 from models.humanoid.skeleton import rest_pose
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording

@@ -9,7 +9,7 @@ from experiments.config.options import run_config
 from experiments.setups.modes.rivers import LEAST_HYSTERESIS, default_choice
 from experiments.setups.parts.hands import RIVER_PUSH, river_pushes
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from sim.loop.loop import Loop
 
 RADIUS = 0.0477

@@ -9,7 +9,7 @@ from experiments.config.options import run_config
 from experiments.setups.parts import pace
 from experiments.setups.parts.pace import friction_along, inertia_along, paced
 from experiments.setups.wiring import wire
-from experiments.trials.trial.trial_log import TrialLog
+from experiments.trials.trial.measures import TrialLog
 from models.phantom.dynamics import mass_matrix
 from models.world.scene import PHANTOM
 from sim.errors import SimError

@@ -8,9 +8,8 @@ import pytest
 
 from controllers.errors import ParameterError
 from experiments.trials.design.design import balanced_latin_square, conditions, design_trials
-from experiments.trials.design.errors import StudyError
 from experiments.trials.design.plan import file_digest, plan_trials
-from experiments.trials.design.study_config import parse_study, read_toml
+from experiments.trials.design.study_config import StudyError, parse_study, read_toml
 from experiments.trials.study import Study
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[4] / "examples/studies").glob("*.toml"))

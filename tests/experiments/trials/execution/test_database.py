@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.design.errors import StudyError
+from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
 from experiments.trials.trial.run_trial import Row
 

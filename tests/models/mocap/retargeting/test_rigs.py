@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model
 from models.mocap.library import embedded, embedded_names, load
-from models.mocap.motion import kinematics, quaternions
+from models.mocap.motion import kinematics
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations, sole_points
 from models.mocap.retargeting import abdomen, calibration, retarget

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from sim.loop.clock import RealTime
+from sim.viewer.shown import RealTime
 
 
 @pytest.fixture

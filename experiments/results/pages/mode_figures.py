@@ -1,13 +1,11 @@
-"""The figure of a run in LEADING: paths of hand and humanoid from above, speed, and force over time."""
+"""Figures of runs of one kind: of a led figure, of a curve that was bent, and of the robot arm."""
 
-from pathlib import Path
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.results.pages.figures import AXES, PALE_TUBE, PALE_USER, STYLE, legend_above
+from controllers.curves.trajectory import Trajectory
+from experiments.results.pages.figures import AXES, PALE_TUBE, PALE_USER, legend_above
 from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
@@ -15,12 +13,6 @@ from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 POINTS = 3000  # most points drawn of a line
 BACK = (0, (4, 2.5))  # line style of the way back
 SUPPORTS = ((2, PALE_TUBE, "on two feet"), (0, PALE_USER, "in flight"))  # single support stays white
-
-
-def draw_lead(recording: Recording, target: Path) -> None:
-    """Draw the figure of a led run from its recording."""
-    with mpl.rc_context(STYLE):
-        lead_figure(recording).savefig(target, dpi=150)
 
 
 def lead_figure(recording: Recording) -> Figure:
@@ -81,3 +73,39 @@ def _draw_paths(ax: Axes, recording: Recording, stride: int, turned: int) -> Non
     title = f"pelvis and stylus from above, over the floor; 1 mm of the stylus is {scale:.0f} mm there"
     ax.set(title=title, xlabel="x [m]", ylabel="y [m]")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
+
+
+def arm_figure(recording: Recording) -> Figure:
+    """Path of the tool over the scaled curve of the stylus, and the tracking error of the tool over time."""
+    t, tool, led = (recording.channel("frames", name)[:] for name in ("t", "tool", "led"))
+    curve = recording.arrays["tool_home"] + recording.arrays["tool_scale"] * recording.arrays["curve"]
+    ticks, user = recording.channel("ticks", "t")[:], recording.channel("ticks", "user")[:]
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    path, error = figure.subplots(1, 2, width_ratios=(1, 1.6))
+    path.plot(1e3 * tool[:, 1], 1e3 * tool[:, 2], color=FIELD, label="tool")
+    path.plot(1e3 * curve[:, 1], 1e3 * curve[:, 2], color=CURVE, ls=(0, (4, 3)), lw=0.8, label="curve, scaled")
+    path.set(xlabel="y [mm]", ylabel="z [mm]", title="tool, from the front", aspect="equal")
+    path.legend()
+    error.plot(t, 1e3 * np.linalg.norm(tool - led, axis=1), color=FIELD, label="tool from where it is led [mm]")
+    error.plot(ticks, np.linalg.norm(user, axis=1), color=USER, label="force of the hand [N]")
+    error.set(xlabel="time [s]", ylim=(0.0, None), title="tracking")
+    error.legend(loc="upper left")
+    return figure
+
+
+def stretch_figure(recording: Recording, bent: Trajectory) -> Figure:
+    """The curve before and after it was bent, and the path of the stylus, from above and from the right [mm]."""
+    before, after = recording.arrays["curve"], bent.point(np.linspace(bent.start, bent.end, POINTS))
+    path = recording.channel("ticks", "p")
+    path = path[:: max(1, len(path) // POINTS)]
+    figure = Figure(figsize=(7.2, 3.9), layout="constrained")
+    for ax, (i, j), title in zip(
+        figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the right"), strict=True
+    ):
+        ax.plot(1e3 * path[:, i], 1e3 * path[:, j], color=USER, lw=0.7, alpha=0.7, label="stylus")
+        ax.plot(1e3 * before[:, i], 1e3 * before[:, j], color=CURVE, lw=0.9, ls=(0, (4, 3)), label="curve before")
+        ax.plot(1e3 * after[:, i], 1e3 * after[:, j], color=FIELD, lw=1.8, label="curve after")
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set(title=title, xlabel=f"{'xyz'[i]} [mm]", ylabel=f"{'xyz'[j]} [mm]")
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
