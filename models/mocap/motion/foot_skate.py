@@ -34,7 +34,7 @@ class ContactSlide:
         for k, touches in enumerate(touching.T):
             for start, end in spans(touches):
                 path = points[start:end, k, :2]
-                origin = before.get(k, path[0]) if start == 0 else path[0]
+                origin = before[k] if start == 0 and k in before else path[0]
                 self.largest = max(self.largest, float(np.linalg.norm(path - origin, axis=1).max()))
                 if end == len(points):
                     self._origins[k] = origin

@@ -4,8 +4,9 @@ The distance d of two frames is that of `laps`. A part of the clip is its cycle 
 the clip only repeats it, its turns included; a cross-fade with the frames around its ends makes poses and velocities
 agree at the seam. A gesture, whose root ends about where it began, gets a way back to its first pose. Half a stride of
 a gait, whose end is the mirror image of its start, is continued by its mirror image. Everything else comes to rest at
-both ends. A closed motion with a foot that always stands returns exactly to its place: otherwise the foot would skate
-by the difference in every lap.
+both ends, where a walking body stands still on its supporting foot and puts the other one beside it. A closed motion
+with a foot that always stands returns exactly to its place: otherwise the foot would skate by the difference in every
+lap.
 """
 
 from typing import Literal, NamedTuple
@@ -16,9 +17,9 @@ from geometry import quaternions
 from geometry.arrays import Array, IntArray
 from geometry.easing import smooth_steps
 from models.errors import ModelError
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, PlanarDisplacement, pose_difference
-from models.mocap.motion.kinematics import sole_points
+from models.mocap.motion.kinematics import global_rotations, sole_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.laps import best_lap, frame_distances
 from models.mocap.preparation.poses import add_tangents, smoothed
@@ -64,6 +65,13 @@ _IN_PLACE_DISTANCE, _IN_PLACE_ANGLE = 0.10, np.deg2rad(15.0)
 # with the speed [s per m/s], up to a maximum [s].
 _REST_TIME = 0.35
 _REST_TIME_PER_SPEED, _MAX_REST_TIME = 0.2, 0.8
+# A body walks at an end if its root is faster than this [m/s], its chest tilts by less than this, and its lower foot is
+# below this [m].
+_MIN_WALKING_SPEED, _MIN_WALKING_COSINE, _MAX_SUPPORT_HEIGHT = 0.3, np.cos(np.deg2rad(30.0)), 0.05
+_STOP_TIME = 0.9  # time in which a walking body comes to stand [s]
+_STEP_FLEXION = np.deg2rad(
+    20.0
+)  # of the hip in the last step, and half of the knee's, so that the foot clears the floor
 # How far a joint may exceed its range as it comes to rest [rad], and how often its time is halved, down to 0.01 s.
 _RANGE_TOLERANCE, _MAX_HALVINGS = np.deg2rad(1.0), 6
 # Approximate number of frames that are compared with each other: a matrix takes 2 MB. Half or twice loops 17 captures
@@ -71,6 +79,7 @@ _RANGE_TOLERANCE, _MAX_HALVINGS = np.deg2rad(1.0), 6
 _COMPARED_FRAMES = 500
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
+Ending = Literal["step", "decay", "limited decay"]
 
 
 class LoopedClip(NamedTuple):
@@ -102,7 +111,7 @@ class LoopedClip(NamedTuple):
 
 
 def close_or_rest(
-    clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False, within: bool = False
+    clip: Clip, wish: str = "auto", wraps: bool | None = None, mirror: bool = False, ending: Ending = "step"
 ) -> LoopedClip:
     """Close a clip, or bring it to rest at both ends.
 
@@ -116,8 +125,9 @@ def close_or_rest(
         Whether the file declares itself to be cyclic; None if it says nothing.
     mirror : bool
         Whether half a stride, or START:END, is to be continued by its mirror image.
-    within : bool
-        Whether joints of an open clip that would leave their ranges while coming to rest do so in less time.
+    ending : {"step", "decay", "limited decay"}
+        How an open clip comes to rest: with a last step where it walks, by decay of its velocities, or with joints that
+        would leave their ranges stopped in less time.
 
     Raises
     ------
@@ -131,7 +141,7 @@ def close_or_rest(
             raise ModelError(f"{clip.name}: --mirror, but no part of it ends like its start mirrored; expected a gait")
         return _close(clip, *half, half=True)
     if clip.n_frames < 8 or wish == "open":
-        return _bring_to_rest(clip, within)
+        return _bring_to_rest(clip, ending)
     if wish != "auto":
         start, end = _requested_frames(clip, wish)
         return _close(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
@@ -148,7 +158,7 @@ def close_or_rest(
         return _with_return(clip, gap)
     if _is_fast(clip) and (half := _find_half_stride(clip)) is not None:
         return _close(clip, *half, half=True)
-    return _bring_to_rest(clip, within)
+    return _bring_to_rest(clip, ending)
 
 
 def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
@@ -320,13 +330,13 @@ def _with_return(clip: Clip, gap: float) -> LoopedClip:
     return LoopedClip(Clip(np.vstack((clip.poses, way)), clip.fps, clip.name), "way back", 0.0, clip.duration, gap)
 
 
-def _bring_to_rest(clip: Clip, within: bool) -> LoopedClip:
+def _bring_to_rest(clip: Clip, ending: Ending) -> LoopedClip:
     """The clip with frames added at both ends, in which velocities decay to zero and the soles come to the floor."""
     if clip.n_frames < 2 or clip.fps * _REST_TIME < 2.0:
         return LoopedClip(clip, "open", 0.0, clip.duration, 0.0)
     velocities = _low_passed_velocities(clip)
-    before = _come_to_rest(clip.poses[0], -velocities[0], clip.fps, within)[::-1]
-    after = _come_to_rest(clip.poses[-1], velocities[-1], clip.fps, within)
+    before = _come_to_rest(clip.poses[0], -velocities[0], clip.fps, ending)[::-1]
+    after = _come_to_rest(clip.poses[-1], velocities[-1], clip.fps, ending)
     poses = np.vstack((before, clip.poses, after))
     start = -len(before) / clip.fps
     return LoopedClip(Clip(poses, clip.fps, clip.name), "open", start, clip.duration, 0.0)
@@ -337,16 +347,18 @@ def _low_passed_velocities(clip: Clip) -> Array:
     return smoothed(clip).velocities()
 
 
-def _come_to_rest(pose: Array, velocity: Array, fps: float, within: bool) -> Array:
+def _come_to_rest(pose: Array, velocity: Array, fps: float, ending: Ending) -> Array:
     """Poses in which a velocity decays as (1 − x)² (1 + 2x), x = t/T, while the soles come down to the floor.
 
-    T grows with the root's speed for the root only: with a longer T, limbs would exceed their joint limits. With
-    `within`, a joint that would still leave its range, as by noise in a first frame, gets half of T, or a quarter, ….
+    T grows with the root's speed for the root only: with a longer T, limbs would exceed their joint limits. In a
+    limited decay, a joint that would still leave its range, as by noise in a first frame, gets half of T, a quarter, ….
     """
+    if ending == "step" and _walks(pose, velocity):
+        return _step_to_stand(pose, velocity, fps)
     longest = np.minimum(_REST_TIME + _REST_TIME_PER_SPEED * float(np.linalg.norm(velocity[:2])), _MAX_REST_TIME)
     times = np.repeat((longest, _REST_TIME), (3, len(velocity) - 3))
     allowed = np.maximum(beyond_ranges(pose[None])[0], 0.0) + _RANGE_TOLERANCE
-    for _ in range(_MAX_HALVINGS if within else 0):
+    for _ in range(_MAX_HALVINGS if ending == "limited decay" else 0):
         times[6:] /= 1.0 + np.repeat(beyond_ranges(_decay(pose, velocity, times, fps)).max(axis=0) > allowed, 3)
     poses = _decay(pose, velocity, times, fps)
     x = np.arange(1, len(poses) + 1) / (fps * longest)
@@ -357,8 +369,59 @@ def _come_to_rest(pose: Array, velocity: Array, fps: float, within: bool) -> Arr
 
 def _decay(pose: Array, velocity: Array, times: Array, fps: float) -> Array:
     """Poses over the longest of the times T (57,) [s], each component of the velocity decaying over its own time."""
-    x = np.minimum(np.arange(1, round(times.max() * fps) + 1)[:, None] / (fps * times), 1.0)
-    return add_tangents(np.repeat(pose[None], len(x), axis=0), (x - x**3 + x**4 / 2.0) * times * velocity)
+    frames = np.arange(1, round(times.max() * fps) + 1)
+    return add_tangents(np.repeat(pose[None], len(frames), axis=0), _decayed(frames / fps, times) * velocity)
+
+
+def _decayed(time: Array, times: Array) -> Array:
+    """Displacement per unit of a velocity that decays over T (57,), at the times (n,): (n, 57) [s]."""
+    x = np.minimum(time[:, None] / times, 1.0)
+    return (x - x**3 + x**4 / 2.0) * times
+
+
+def _walks(pose: Array, velocity: Array) -> bool:
+    """Whether the body is upright, moves over the floor, and has a foot there."""
+    tilt = quaternions.rotated(global_rotations(pose[None])[0, BODIES.index("chest")], np.array([0.0, 0.0, 1.0]))[2]
+    height = sole_points(pose[None])[0, :, 2].min() - CONTACT_RADIUS
+    speed = np.hypot(*velocity[:2])
+    return bool(speed > _MIN_WALKING_SPEED and tilt > _MIN_WALKING_COSINE and height < _MAX_SUPPORT_HEIGHT)
+
+
+def _step_to_stand(pose: Array, velocity: Array, fps: float) -> Array:
+    r"""Poses in which a walking body stands still on its lower foot and puts the other one beside it.
+
+    Pelvis, spine and legs go from their rotations q₀ to those q₁ of standing, with the velocity at first:
+
+    .. math:: q(t) = q_0 \exp(S(x) \log(q_0^{-1} q_1) + T\,(x - 6x^3 + 8x^4 - 3x^5)\,\omega), \quad x = t/T
+
+    with the smooth step S. The hip and twice as much the knee of the stepping leg bend between. The lower foot carries
+    the root, but for the difference of its velocity, which decays likewise. Head and arms come to rest by themselves.
+    """
+    n = round(_STOP_TIME * fps)
+    x = np.arange(1, n + 1)[:, None] / n
+    standing, rows = pose.copy(), np.zeros(len(velocity), dtype=bool)
+    standing[3:7] = quaternions.about_axis(2, quaternions.heading(pose[3:7]) + velocity[5] * _STOP_TIME / 3.0)
+    rows[3:6] = True
+    for k, joint in enumerate(JOINTS):
+        if joint.endswith(("abdomen", "chest", "hip", "knee", "ankle")):
+            standing[7 + 4 * k : 11 + 4 * k] = 1.0, 0.0, 0.0, 0.0
+            rows[6 + 3 * k : 9 + 3 * k] = True
+    drift = (x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5) * _STOP_TIME
+    decay = _decayed(np.arange(1, n + 1) / fps, np.full(len(velocity), _REST_TIME)) * velocity
+    tangents = np.where(rows, smooth_steps(x) * pose_difference(pose, standing) + drift * velocity, decay)
+    tangents[:, :3] = 0.0
+    soles = sole_points(pose[None])[0].reshape(2, 4, 3)
+    support = int(np.argmin(soles[:, :, 2].min(axis=1)))
+    for joint, ratio in (("hip", -1.0), ("knee", 2.0), ("ankle", -1.0)):
+        pitch = 7 + 3 * JOINTS.index(f"{('left', 'right')[1 - support]}_{joint}")
+        tangents[:, pitch] += ratio * _STEP_FLEXION * (4.0 * x * (1.0 - x))[:, 0] ** 2
+    poses = add_tangents(np.repeat(pose[None], n, axis=0), tangents)
+    moved = sole_points(poses).reshape(n, 2, 4, 3)
+    slip = (moved[:, support] - soles[support]).mean(axis=1)[:, :2]
+    poses[:, :2] -= slip - drift * (velocity[:2] + slip[0] * fps)
+    height = soles[:, :, 2].min() - CONTACT_RADIUS
+    poses[:, 2] += height * (1.0 - smooth_steps(x[:, 0])) - (moved[..., 2].min(axis=(1, 2)) - CONTACT_RADIUS)
+    return poses
 
 
 def mirrored(clip: Clip) -> Clip:

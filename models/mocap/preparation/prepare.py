@@ -130,33 +130,51 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
         raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
     timed = correct_pace(resampled(captured, FPS))
     even_clip = resampled(timed.clip, FPS)
-    for within in (False, True):
-        # Joints stop within their ranges only if needed: otherwise a backflip has a residual of 27 % instead of 8 %.
-        cycle = close_or_rest(even_clip, loop, loaded.loops, mirror, within)
-        if (lasts := cycle.clip.duration) > _MAX_DURATION:
-            part = "or a part of it by `hvf prepare --loop START:END`"
-            raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_MAX_DURATION:.0f} s, {part}")
-        smooth_cycle = smoothed(cycle.clip)
-        planted = without_foot_sliding(cycle.clip, smooth_cycle)
-        smooth = smoothed(planted)
-        schedule = with_feet_at_rest(stances(planted, smooth), planted)
-        result = feasible(smooth, schedule, fps=FPS)
-        near = (
-            result.turned < _MAX_ROTATION_CHANGE
-            and result.raised < _MAX_HEIGHT_CHANGE
-            and result.residual < RESIDUAL_IN_FLIGHTS
-        )
-        near = near and _range_excess(result.clip) < max(_range_excess(even_clip), 0.0) + _MAX_ADDED_EXCESS
-        if near or cycle.kind != "open":
+    attempt = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
+    # Joints stop within their ranges only if needed: otherwise a backflip has a residual of 27 % instead of 8 %.
+    for ending in ("decay", "limited decay"):
+        if attempt.near or attempt.cycle.kind != "open":
             break
+        cycle = close_or_rest(even_clip, loop, loaded.loops, mirror, ending)
+        if not np.array_equal(cycle.clip.poses, attempt.cycle.clip.poses):
+            attempt = _attempt(path, cycle, even_clip)
+    cycle, planted, schedule, result, near = attempt
     carried = float(np.linalg.norm((planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
-    chosen = result.clip if near else smooth_cycle
+    chosen = result.clip if near else smoothed(cycle.clip)
     clip = Clip(chosen.poses, chosen.fps, captured.name)
     distance = fidelity(clip, captured, cycle, timed.pace)
     hands = _hand_load(planted, schedule) if near and schedule.hands.any() else HandLoad(0.0, 0.0)
     return Prepared(
         clip, captured, loaded.report, timed, cycle, carried, hands, result, distance, process_time() - began, near
     )
+
+
+class _Attempt(NamedTuple):
+    """A looped clip, the same with its root moved, its contacts, the feasible motion, and whether it is near."""
+
+    cycle: LoopedClip
+    planted: Clip
+    schedule: Stances
+    result: Feasible
+    near: bool
+
+
+def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> _Attempt:
+    """Make a looped clip feasible."""
+    if (lasts := cycle.clip.duration) > _MAX_DURATION:
+        part = "or a part of it by `hvf prepare --loop START:END`"
+        raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_MAX_DURATION:.0f} s, {part}")
+    planted = without_foot_sliding(cycle.clip, smoothed(cycle.clip))
+    smooth = smoothed(planted)
+    schedule = with_feet_at_rest(stances(planted, smooth), planted)
+    result = feasible(smooth, schedule, fps=FPS)
+    near = (
+        result.turned < _MAX_ROTATION_CHANGE
+        and result.raised < _MAX_HEIGHT_CHANGE
+        and result.residual < RESIDUAL_IN_FLIGHTS
+        and _range_excess(result.clip) < max(_range_excess(captured), 0.0) + _MAX_ADDED_EXCESS
+    )
+    return _Attempt(cycle, planted, schedule, result, near)
 
 
 def _range_excess(clip: Clip) -> float:

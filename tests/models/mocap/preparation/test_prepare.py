@@ -9,6 +9,7 @@ from experiments.preparation import prepared_clip
 from experiments.preparation.command import prepare_file
 from experiments.preparation.prepared_file import advice, summary
 from experiments.preparation.tracking_trial import followed
+from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded, load
@@ -153,6 +154,25 @@ def test_looped_brings_a_clip_without_repetition_to_rest_at_both_ends(walks):
     assert max(speeds[0].max(), speeds[-1].max()) < 0.2
 
 
+def test_walk_that_is_cut_anywhere_begins_and_ends_standing(walks):
+    """Side by side on both feet, the trunk upright; the foot that bears the body stays where it is."""
+    n = walks[0].n_frames
+    for start in range(0, n // 2, n // 12):
+        part = Clip(walks[1].poses[start : start + n // 2 + 7], 120.0, "part")
+        found = close_or_rest(part, "open").clip
+        for frame, inner in ((0, 60), (-1, -60)):
+            feet = sole_points(found.poses[[frame]])[0].reshape(2, 4, 3)
+            ahead = quaternions.rotated(found.poses[frame, 3:7], np.eye(3)[0])
+            assert np.abs((feet.mean(axis=1)[0] - feet.mean(axis=1)[1]) @ ahead) < 0.12
+            assert feet[..., 2].max() < CONTACT_RADIUS + 0.03
+            tilt = quaternions.rotated(found.poses[frame, 3:7], np.eye(3)[2])[2]
+            assert np.rad2deg(np.arccos(tilt)) < 1.0
+            moved = np.linalg.norm(np.diff(sole_points(found.poses[[frame, inner]])[..., :2], axis=0)[0], axis=1)
+            assert moved.min() < 0.05
+        steps = np.abs(found.velocities())
+        assert max(steps[0].max(), steps[-1].max()) < 0.2
+
+
 def test_noise_in_the_first_frame_hardly_changes_the_transition_from_rest(walks):
     """An elbow 8° off in the first frame moves at 17 rad/s by the difference of two frames: from that velocity it would
     turn by a further 176° before it rests, from that of the low-passed motion by 66°."""
@@ -177,8 +197,8 @@ def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
         thrown[0, knee + 1] = -15.0 * (12 - k) / opened.fps
         poses[n - 1 - k] = add_tangents(poses[n - 1 - k : n - k], -thrown)[0]
     excess = [
-        beyond_ranges(close_or_rest(Clip(poses, opened.fps, "thrown"), "open", within=within).clip.poses[n:]).max()
-        for within in (False, True)
+        beyond_ranges(close_or_rest(Clip(poses, opened.fps, "thrown"), "open", ending=ending).clip.poses[n:]).max()
+        for ending in ("decay", "limited decay")
     ]
     captured_excess = max(beyond_ranges(poses).max(), 0.0)
     assert excess[0] > captured_excess + np.deg2rad(20.0)
@@ -452,7 +472,7 @@ def test_existing_target_is_not_overwritten(tmp_path):
 
 @pytest.mark.parametrize(("degrees", "near"), [(10.0, True), (60.0, False)])
 def test_motion_with_a_joint_far_beyond_its_range_is_not_near_the_capture(degrees, near, monkeypatch, tmp_path):
-    """As when a run cut at full speed comes to rest. It is solved again within the ranges, then left as captured."""
+    """As when a run cut at full speed comes to rest. Without a last step it is solved again, then left as captured."""
     attempts = []
 
     def bent(clip, schedule, **options):
@@ -463,10 +483,13 @@ def test_motion_with_a_joint_far_beyond_its_range_is_not_near_the_capture(degree
         return feasible(clip, schedule, **options)._replace(clip=Clip(poses, clip.fps, clip.name), residual=0.0)
 
     monkeypatch.setattr("models.mocap.preparation.prepare.feasible", bent)
-    write_bvh(embedded("cheer"), tmp_path / "r.bvh")
+    walk = embedded("walk")
+    write_bvh(
+        embedded("cheer") if near else Clip(walk.poses[: walk.n_frames // 2 + 7], walk.fps, "r"), tmp_path / "r.bvh"
+    )
     made = prepared(tmp_path / "r.bvh", "0:1" if near else "open")
     assert made.near is near
-    assert len(attempts) == (1 if near else 2)
+    assert len(attempts) == (1 if near else 3)
     assert np.rad2deg(beyond_ranges(made.clip.poses).max()) < 30.0
     message = " ".join(advice(made))
     assert message == "" if near else re.search(r"takes a joint \d\d° beyond its range", message)
