@@ -56,6 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
 
 
+def _ignore_warning(warning: str) -> None:
+    """Ignore a warning of MuJoCo, which keeps count of its warnings itself."""
+
+
 def _run(arguments: Sequence[str] | None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words in ([], ["--version"]):
@@ -69,7 +73,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         import mujoco  # imported late: help and error messages do not need it
 
         # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a run's summary counts them.
-        mujoco.set_mju_user_warning(lambda warning: None)
+        mujoco.set_mju_user_warning(_ignore_warning)
         return command()
     except BrokenPipeError:
         raise
