@@ -243,7 +243,7 @@ def test_other_major_version_is_a_fault_and_other_minor_version_is_not(handle: F
 
 @pytest.mark.parametrize(
     ("number", "changed", "message"),
-    [(protocol.IDENTITY, {"magic": 5}, "the mark 0x5; expected 0x31465648"),
+    [(protocol.IDENTITY, {"magic": 5}, "the magic 0x5; expected 0x31465648"),
      (protocol.CALIBRATION, {"counts_per_turn": 0}, "expected none to be 0")],
 )  # fmt: skip
 def test_device_with_wrong_magic_or_zero_scale_is_refused(handle, number, changed, message) -> None:

@@ -91,7 +91,7 @@ def test_share_of_other_joints_scales_their_rotation(share):
             # The chordal mean of two rotations lies between them; its angle is near the share of theirs.
             np.testing.assert_allclose(np.cross(part[12:], whole[12:]), 0.0, atol=1e-9)
             assert np.linalg.norm(part[12:]) == pytest.approx(share * np.linalg.norm(whole[12:]), rel=0.15)
-    assert (f"{100 * share:.0f} % of the others' arms" in some.remarks[0]) == (share < 1.0)
+    assert (f"{100 * share:.0f} % of the others' arm motion" in some.remarks[0]) == (share < 1.0)
 
 
 @pytest.mark.parametrize("haptic_map", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "above 1"])

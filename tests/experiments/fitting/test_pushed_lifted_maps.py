@@ -59,7 +59,7 @@ WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure
         ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
         (
             {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
-            1, 0.5, (WHOLE_MAP_REMARK.format("lacks 20 % of weight"),),
+            1, 0.5, (WHOLE_MAP_REMARK.format("has a residual of 20 % of weight"),),
         ),
         (
             {"whole": FALLS, 1.0: Verdict(0.09, np.inf), 0.5: Verdict(0.08, np.inf), 0.25: Verdict(0.1, np.inf),

@@ -172,7 +172,7 @@ def test_pareto_front_and_its_middle_choice() -> None:
         ({"space": {}}, "empty space"),
         ({"space": {"stifness": {"low": 1.0, "high": 2.0}}}, "stifness is not known"),
         ({"space": {"stiffness": {"low": 2.0, "high": 1.0}}}, "is from 2 to 1"),
-        ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "low > 0 for log|log of > 0"),
+        ({"space": {"stiffness": {"low": 0.0, "high": 1.0, "log": True}}}, "above 0 with log|log of > 0"),
         ({"objectives": ["speed"]}, "no objective 'speed'"),
         ({"objectives": ["margin"]}, "no measure among its objectives"),
         ({"objectives": ["effort", "effort"]}, "an objective appears twice"),

@@ -99,7 +99,7 @@ def test_three_people_are_refused(files, tmp_path):
 def test_coincident_copy_of_a_skeleton_is_dropped_with_a_remark(files, tmp_path):
     loaded = load(scene(tmp_path / "both.bvh", (files[1], "DEF-", 0.0), (files[1], "ORG-", 0.0)))
     np.testing.assert_allclose(loaded.clip.poses, load(files[1]).clip.poses, atol=1e-6)
-    remark = "2 skeletons have their hips at the same position (DEF-Hips, ORG-Hips): that of DEF-Hips is taken"
+    remark = "2 skeletons have their hips at the same position (DEF-Hips, ORG-Hips): that of DEF-Hips is used"
     assert any(remark in line for line in loaded.report.notes())
 
 
