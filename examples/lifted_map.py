@@ -1,4 +1,4 @@
-"""Lift two clips to curves of their own, follow one with a field of one's own, then push over from it to the other."""
+"""Lift two clips to curves of their own, follow one with a user-defined field, then push over from it to the other."""
 
 import tempfile
 from pathlib import Path

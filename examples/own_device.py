@@ -1,4 +1,4 @@
-"""A device of one's own in the loop: `hvf hardware run --device own_device.py:Mass …` opens this class.
+"""A user-defined device in the loop: `hvf hardware run --device own_device.py:Mass …` opens this class.
 
 In place of real hardware it is a mass that moves by the force it is given, held by nobody.
 """

@@ -1,4 +1,4 @@
-"""A hand of one's own: a person who pulls inwards while the stylus is on the left, and feels what that takes."""
+"""A user-defined hand: a person who pulls inwards while the stylus is on the left, and feels what that takes."""
 
 import hvf
 

@@ -1,4 +1,4 @@
-"""A law of force of one's own beside a built-in one: in Python, compiled, and certified."""
+"""A user-defined law of force beside a built-in one: in Python, compiled, and certified."""
 
 import hvf
 

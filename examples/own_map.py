@@ -1,4 +1,4 @@
-"""A haptic map of one's own, in Python: the trunk bows with the stylus's radius, and turns as it goes round."""
+"""A user-defined haptic map, in Python: the trunk bows with the stylus's radius, and turns as it goes round."""
 
 import numpy as np
 

@@ -7,7 +7,7 @@
 | `spacemouse`, `spacemouse:PATH` | a 3Dconnexion SpaceMouse |
 | `hdapi`, `hdapi:NAME` | an OpenHaptics device, by its name in the vendor's configuration |
 | `dhd` | a Force Dimension device |
-| `FILE.py:CLASS` | a device of one's own (`sim.devices.own_device`) |
+| `FILE.py:CLASS` | a user-defined device (`sim.devices.own_device`) |
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""A device of one's own: a class in a file, which reports the stylus's pose and takes a force at its tip.
+"""A user-defined device: a class in a file, which reports the stylus's pose and takes a force at its tip.
 
 ``hvf hardware run --device haply.py:Haply`` opens the class `Haply` of the file ``haply.py``. The device is treated as
 a virtual Phantom (`sim.devices.virtual_arm`): gate, watchdog of readings, certificate and recorder are those of every
@@ -30,7 +30,7 @@ _Result = TypeVar("_Result")
 
 
 class TipPose(NamedTuple):
-    """What a device of one's own reads.
+    """What a user-defined device reads.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class TipPose(NamedTuple):
 
 
 class TipDevice(ABC):
-    """A device of one's own, made without arguments; a subclass opens its device in ``__init__``.
+    """A user-defined device, made without arguments; a subclass opens its device in ``__init__``.
 
     Whatever `read` or `write` raises is a fault: the force is released, and the error is printed once.
 
@@ -85,7 +85,7 @@ class TipDevice(ABC):
 
 
 class TipDriver:
-    """The driver of a device of one's own (see `sim.devices.driver.Driver`).
+    """The driver of a user-defined device (see `sim.devices.driver.Driver`).
 
     Parameters
     ----------

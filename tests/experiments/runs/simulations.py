@@ -1,4 +1,4 @@
-"""A circle, a law of one's own, and simulations of a field on that circle."""
+"""A circle, a user-defined law, and simulations of a field on that circle."""
 
 import hvf
 
