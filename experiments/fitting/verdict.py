@@ -60,8 +60,8 @@ def motion_of(poses: Array, fps: float) -> Motion:
     clip = Clip(poses, fps, "blend")
     schedule = stances(clip, smoothed(clip))
     support = contact_forces(clip, schedule)
-    slides, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
-    return Motion(support.residual, float(lowest), float(np.quantile(slides, 0.95)), float(slides.max()))
+    found, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
+    return Motion(support.residual, float(lowest), float(np.quantile(found, 0.95)), float(found.max()))
 
 
 class Verdict(NamedTuple):

@@ -13,10 +13,12 @@ from experiments.config.maps import MAP_SUFFIX
 from experiments.files.given_path import given_path
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable
-from experiments.fitting.verdict import MAX_FOOT_SKATE, MAX_JOINT_EXCESS, MAX_PENETRATION
+from experiments.fitting.verdict import MAX_JOINT_EXCESS, MAX_PENETRATION
 from experiments.lifting.lift import LiftedClips, lift_clips
 from experiments.lifting.map_quality import MapQuality, MotionMeasure, measure_map
 from sim.errors import SimError
+
+_MAX_SLIDE = 0.02  # largest slide of an in-between [m]
 
 
 class LiftReport(NamedTuple):
@@ -83,7 +85,7 @@ class LiftReport(NamedTuple):
         ]
         if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
             lines.append(
-                f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * MAX_FOOT_SKATE:.0f} cm, a "
+                f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * _MAX_SLIDE:.0f} cm, a "
                 f"joint is {np.degrees(MAX_JOINT_EXCESS):.0f}° or more beyond its limits, or the body "
                 f"{100 * MAX_PENETRATION:.0f} cm below ground). "
                 "A run with the physical figure tries the map first, and plays the legs of a curve's own clip where it "
@@ -132,11 +134,7 @@ def _fault_text(measure: MotionMeasure) -> str:
 
 def _is_motion(measure: MotionMeasure) -> bool:
     """Whether a measured motion keeps its feet, its joints and the floor, within the tolerances of `verdict`."""
-    return (
-        measure.slide <= MAX_FOOT_SKATE
-        and measure.limits <= MAX_JOINT_EXCESS
-        and measure.penetration <= MAX_PENETRATION
-    )
+    return measure.slide <= _MAX_SLIDE and measure.limits <= MAX_JOINT_EXCESS and measure.penetration <= MAX_PENETRATION
 
 
 def _arrangement_data(measure: ArrangementMeasure) -> dict[str, object]:

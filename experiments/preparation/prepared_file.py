@@ -121,23 +121,20 @@ def changes(made: Prepared) -> tuple[str, ...]:
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
-    if part.left_out[0] > _MIN_LEFT_OUT:
-        lines.append(
-            f"{part.left_out[0]:.1f} s of the capture, the first at {part.left_out[1]:.2f} s, are unlike the cycle: "
-            "--loop open keeps them"
-        )
-    turn, turn_at_rate = np.rad2deg(part.turns)
-    if abs(turn - turn_at_rate) > _MAX_LOST_TURN:
-        lines.append(
-            f"the capture turns by {turn:.0f}°, at the cycle's rate by {turn_at_rate:.0f}°: --loop open keeps its turns"
-        )
+    seconds, since = part.left_out
+    if seconds > _MIN_LEFT_OUT:
+        what = f"{seconds:.1f} s of the capture, the first at {since:.2f} s, are unlike the cycle"
+        lines.append(f"{what}: --loop open keeps them")
+    turn, repeated = (round(float(np.rad2deg(angle))) for angle in part.turns)
+    if abs(turn - repeated) > _MAX_LOST_TURN:
+        lines.append(f"the capture turns by {turn}°, at the cycle's rate by {repeated}°: --loop open keeps its turns")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall at {pace.falls:.1f} m/s²")
     elif pace.falls is not None and 0.0 < pace.falls < _MAX_SLOW_FALL:
         rate = made.captured.fps * float(np.sqrt(GRAVITY / pace.falls))
         lines.append(
             f"its flights fall at {two_digits(pace.falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
-            "if they are jumps, state the --frame-rate"
+            "if they are jumps, give --frame-rate"
         )
     if made.root_shift > _MIN_ROOT_SHIFT:
         lines.append(f"moved over the floor by up to {100 * made.root_shift:.0f} cm, since a loaded foot slides")
@@ -177,8 +174,8 @@ def advice(made: Prepared) -> tuple[str, ...]:
         bound = 100 * RESIDUAL_IN_FLIGHTS
         lacks = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
     return (
-        f"no feasible motion is near: the nearest found turns joints by {np.rad2deg(change.turned):.0f}° and raises or "
-        f"lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
+        f"no feasible motion is near: the last one tried turns joints by {np.rad2deg(change.turned):.0f}° and raises "
+        f"or lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
         f"range, and leaves a residual of {lacks}",
         "try --loop START:END for a part without what is not feasible, "
         + ("" if made.looped.kind == "open" else "--loop open if it does not repeat, ")

@@ -76,7 +76,7 @@ def map_parts(config: RunConfig, body: MjModel, clips: tuple[Clip, ...] | None =
     if isinstance(config.map, RobotArm):
         return robot_arm_parts(body, config.map)
     if isinstance(config.map, Led):
-        return led_parts(config, config.map, played, body).with_remarks(remarks)
+        return led_parts(config, played, body).with_remarks(remarks)
     setup = MAP_SETUPS[config.map.kind]
     return for_size_of(body, lambda model: setup(config, config.map, played, model)).with_remarks(remarks)
 

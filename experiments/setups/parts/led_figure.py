@@ -39,7 +39,7 @@ class LedParts(MapParts[Led]):
     gait: Gait
 
 
-def led_parts(config: RunConfig, part: LedMap, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
+def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
     """Map parts of a led figure.
 
     Raises

@@ -47,6 +47,7 @@ _MIN_SPEED_RATIO = 0.7
 # Largest d between the end of half a stride and its mirrored start [rad]: a run has 0.18, a third of a stride 0.3.
 # Twice changes none of 17 captures, half leaves a run open.
 _MAX_MIRRORED_GAP = 0.25
+_MIN_STATED_TIME = 0.2  # least duration of a cycle that is stated [s]
 _MIN_HALF_STRIDE_TIME = 0.25  # least duration of half a stride [s]: sprinters take 0.22
 # Speed of the root at both ends above which it cannot be brought to rest quickly [m/s]; none of 19 captures is near it.
 _FAST_ROOT_SPEED = 1.0
@@ -71,9 +72,8 @@ _MIN_WALKING_SPEED, _MIN_WALKING_COSINE, _MAX_SUPPORT_HEIGHT = 0.3, np.cos(np.de
 # Time in which a walking body comes to stand [s]. A run that is cut anywhere lacks 3.6 % of its weight; with 0.6 s it
 # lacks 7.2, with 1.3 s 3.2, and its root is 13 cm lower instead of 6. Two walks differ by 0.5 points and 0.4° at most.
 _STOP_TIME = 0.9
-_STEP_FLEXION = np.deg2rad(
-    20.0
-)  # of the hip in the last step, and half of the knee's, so that the foot clears the floor
+# Flexion of the hip in the last step, and half of the knee's [rad]: the foot clears the floor.
+_STEP_FLEXION = np.deg2rad(20.0)
 # How far a joint may exceed its range as it comes to rest [rad], and how often its time is halved, down to 0.01 s.
 _RANGE_TOLERANCE, _MAX_HALVINGS = np.deg2rad(1.0), 6
 # Approximate number of frames that are compared with each other: a matrix takes 2 MB. Half or twice loops 17 captures
@@ -82,6 +82,13 @@ _COMPARED_FRAMES = 500
 
 Kind = Literal["cycle", "half stride", "way back", "open"]
 Ending = Literal["step", "decay", "limited decay"]
+
+
+class LeftOut(NamedTuple):
+    """Time for which a capture is unlike all of its cycle, and when it first is [s]."""
+
+    seconds: float
+    since: float
 
 
 class LoopedClip(NamedTuple):
@@ -98,9 +105,10 @@ class LoopedClip(NamedTuple):
     gap : float
         d between its ends before closing [rad].
     turns : tuple of float
-        Change of heading in the capture, and what it would be at the loop's yaw rate [rad]; zeros if it is not cut.
-    left_out : tuple of float
-        Time for which the capture is unlike all of its cycle, and when it first is [s].
+        Change of heading in the capture, and what it would be at the loop's yaw rate [rad]; equal if it is the
+        whole clip, and zeros if it is open, has a way back or was closed already.
+    left_out : LeftOut
+        What the capture has and its cycle has not.
     """
 
     clip: Clip
@@ -109,7 +117,7 @@ class LoopedClip(NamedTuple):
     end: float
     gap: float
     turns: tuple[float, float] = (0.0, 0.0)
-    left_out: tuple[float, float] = (0.0, 0.0)
+    left_out: LeftOut = LeftOut(0.0, 0.0)
 
 
 def close_or_rest(
@@ -155,7 +163,7 @@ def close_or_rest(
     if wraps and gap < _MAX_DECLARED_GAP:
         return _close(clip, *whole, gap)
     if (cycle := _find_cycle(clip)) is not None:
-        return _close(clip, *cycle[:3])._replace(left_out=cycle[3])
+        return _close(clip, cycle.first, cycle.last, cycle.gap)._replace(left_out=cycle.left_out)
     if _is_in_place(clip):
         return _with_return(clip, gap)
     if _is_fast(clip) and (half := _find_half_stride(clip)) is not None:
@@ -168,10 +176,11 @@ def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
         start, end = (float(part) for part in wish.split(":"))
     except ValueError:
         raise ModelError(f"--loop {wish!r}; expected auto, open, or START:END in seconds") from None
-    if not 0.0 <= start < end - 0.2 <= clip.duration:
+    half_frame = 0.5 / clip.fps
+    if not (0.0 <= start <= end - _MIN_STATED_TIME + half_frame and end <= clip.duration + half_frame):
         raise ModelError(
-            f"--loop {wish}; expected 0 ≤ START, END 0.2 s later or more, and at {clip.duration:.2f} s at most, "
-            "both from the first frame that is kept"
+            f"--loop {wish}; expected 0 ≤ START, END {_MIN_STATED_TIME} s later or more, and at {clip.duration:.2f} s "
+            "at most, both from the first frame that is kept"
         )
     return round(start * clip.fps), min(round(end * clip.fps), clip.n_frames - 1)
 
@@ -180,8 +189,17 @@ def _distances(clip: Clip, frames: IntArray) -> Array:
     return frame_distances(clip, frames)[0]
 
 
-def _find_cycle(clip: Clip) -> tuple[int, int, float, tuple[float, float]] | None:
-    """First frame, last frame, gap and `left_out` of the part that the clip repeats: a gait cycle, or one in place."""
+class _Cycle(NamedTuple):
+    """First and last frame of the part that a clip repeats, d between them, and `left_out`."""
+
+    first: int
+    last: int
+    gap: float
+    left_out: LeftOut
+
+
+def _find_cycle(clip: Clip) -> _Cycle | None:
+    """The part that the clip repeats: a gait cycle, or else a cycle in place."""
     frame_step = -(-clip.n_frames // _COMPARED_FRAMES)
     frames = np.arange(0, clip.n_frames, frame_step)
     distances, headings = frame_distances(clip, frames)
@@ -197,6 +215,8 @@ def _find_cycle(clip: Clip) -> tuple[int, int, float, tuple[float, float]] | Non
         candidates.append((int(frames[i]), int(frames[j]), float(candidates_apart[i, j]), _MAX_IN_PLACE_GAP))
     for start, end, gap, max_gap in candidates:
         inside = (frames >= start) & (frames <= end)
+        if inside.sum() < 2:
+            continue  # shorter than two steps of the comparison
         yaw_rate = np.diff(headings[inside][[0, -1]]) / (frames[inside][-1] - frames[inside][0])
         nearest = distances[:, inside].min(axis=1)
         unlike = nearest > _MAX_COVERED_DISTANCE
@@ -206,13 +226,16 @@ def _find_cycle(clip: Clip) -> tuple[int, int, float, tuple[float, float]] | Non
         complete = covered.mean() >= _MIN_COVERED_FRACTION
         complete &= np.mean(nearest > _MAX_UNLIKE_DISTANCE) <= _MAX_UNLIKE_FRACTION
         if gap < max_gap and moving and complete:
-            first = float(frames[np.argmax(unlike)]) if unlike.any() else 0.0
-            return start, end, gap, (float(unlike.mean() * clip.duration), first / clip.fps)
+            since = float(frames[np.argmax(unlike)]) / clip.fps if unlike.any() else 0.0
+            return _Cycle(start, end, gap, LeftOut(float(unlike.mean() * clip.duration), since))
     return None
 
 
 def _yaw_rates(frames: IntArray, headings: Array, width: int) -> Array:
-    """Mean yaw rate over `width` frames around each frame, at the ends over the first or last ones [rad/frame]."""
+    """Mean yaw rate over `width` frames around each frame, at the ends over the first or last ones [rad/frame].
+
+    Beyond the first and the last frame the heading counts as constant.
+    """
     first = np.clip(frames - width / 2, 0, max(frames[-1] - width, 0))
     return (np.interp(first + width, frames, headings) - np.interp(first, frames, headings)) / width
 
@@ -325,15 +348,19 @@ def _with_return(clip: Clip, gap: float) -> LoopedClip:
     x = np.linspace(0.0, 1.0, n + 1)[1:, None]
     # Quintic with the ends' values and velocities and no acceleration.
     ease = smooth_steps(x)
-    leave = x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5
     arrive = -4.0 * x**3 + 7.0 * x**4 - 3.0 * x**5
-    way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + leave * start + arrive * end)
+    way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + _departing(x) * start + arrive * end)
     way[-1] = first
     return LoopedClip(Clip(np.vstack((clip.poses, way)), clip.fps, clip.name), "way back", 0.0, clip.duration, gap)
 
 
+def _departing(x: Array) -> Array:
+    """Quintic on [0, 1] with unit velocity at 0, at rest at 1, from 0 to 0, without acceleration at its ends."""
+    return x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5
+
+
 def _bring_to_rest(clip: Clip, ending: Ending) -> LoopedClip:
-    """The clip with frames added at both ends, in which velocities decay to zero and the soles come to the floor."""
+    """The clip with frames added at both ends, in which the body comes to rest with its soles on the floor."""
     if clip.n_frames < 2 or clip.fps * _REST_TIME < 2.0:
         return LoopedClip(clip, "open", 0.0, clip.duration, 0.0)
     velocities = _low_passed_velocities(clip)
@@ -354,6 +381,7 @@ def _come_to_rest(pose: Array, velocity: Array, fps: float, ending: Ending) -> A
 
     T grows with the root's speed for the root only: with a longer T, limbs would exceed their joint limits. In a
     limited decay, a joint that would still leave its range, as by noise in a first frame, gets half of T, a quarter, ….
+    A walking body takes a last step instead, if the ending is a step.
     """
     if ending == "step" and _walks(pose, velocity):
         return _step_to_stand(pose, velocity, fps)
@@ -383,10 +411,10 @@ def _decayed(time: Array, times: Array) -> Array:
 
 def _walks(pose: Array, velocity: Array) -> bool:
     """Whether the body is upright, moves over the floor, and has a foot there."""
-    tilt = quaternions.rotated(global_rotations(pose[None])[0, BODIES.index("chest")], np.array([0.0, 0.0, 1.0]))[2]
+    upright = quaternions.rotated(global_rotations(pose[None])[0, BODIES.index("chest")], np.array([0.0, 0.0, 1.0]))[2]
     height = sole_points(pose[None])[0, :, 2].min() - CONTACT_RADIUS
     speed = np.hypot(*velocity[:2])
-    return bool(speed > _MIN_WALKING_SPEED and tilt > _MIN_WALKING_COSINE and height < _MAX_SUPPORT_HEIGHT)
+    return bool(speed > _MIN_WALKING_SPEED and upright > _MIN_WALKING_COSINE and height < _MAX_SUPPORT_HEIGHT)
 
 
 def _step_to_stand(pose: Array, velocity: Array, fps: float) -> Array:
@@ -402,13 +430,14 @@ def _step_to_stand(pose: Array, velocity: Array, fps: float) -> Array:
     n = round(_STOP_TIME * fps)
     x = np.arange(1, n + 1)[:, None] / n
     standing, rows = pose.copy(), np.zeros(len(velocity), dtype=bool)
+    # A third of the time is about how far it turns while it slows down.
     standing[3:7] = quaternions.about_axis(2, quaternions.heading(pose[3:7]) + velocity[5] * _STOP_TIME / 3.0)
     rows[3:6] = True
     for k, joint in enumerate(JOINTS):
         if joint.endswith(("abdomen", "chest", "hip", "knee", "ankle")):
             standing[7 + 4 * k : 11 + 4 * k] = 1.0, 0.0, 0.0, 0.0
             rows[6 + 3 * k : 9 + 3 * k] = True
-    drift = (x - 6.0 * x**3 + 8.0 * x**4 - 3.0 * x**5) * _STOP_TIME
+    drift = _departing(x) * _STOP_TIME
     decay = _decayed(np.arange(1, n + 1) / fps, np.full(len(velocity), _REST_TIME)) * velocity
     tangents = np.where(rows, smooth_steps(x) * pose_difference(pose, standing) + drift * velocity, decay)
     tangents[:, :3] = 0.0

@@ -34,7 +34,7 @@ FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures nee
 # displacement over the floor does not count, as captures drift.
 _MAX_ROTATION_CHANGE, _MAX_HEIGHT_CHANGE = 0.5, 0.15
 # How much further beyond its range a joint may be than in the capture [rad]. Of 177 prepared captures, those that are
-# tracked have 1° at most; runs that are cut at full speed come to rest 50 to 80° further beyond.
+# tracked have 1° at most; runs that are cut at full speed come to rest by decay 50 to 80° further beyond.
 _MAX_ADDED_EXCESS = float(np.deg2rad(20.0))
 _MAX_DURATION = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
@@ -67,7 +67,7 @@ class Prepared(NamedTuple):
         How the file was interpreted; None for a file on the figure's own skeleton.
     paced : Paced
         Result of the pace correction.
-    looped : Looped
+    looped : LoopedClip
         Result of looping, before optimisation.
     root_shift : float
         Largest displacement of the root over the floor that keeps a supporting foot from sliding (`root_path`) [m].
@@ -131,7 +131,8 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     timed = correct_pace(resampled(captured, FPS))
     even_clip = resampled(timed.clip, FPS)
     attempt = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
-    # Joints stop within their ranges only if needed: otherwise a backflip has a residual of 27 % instead of 8 %.
+    # A decay if no last step is feasible nearby. Joints stop within their ranges only if needed: otherwise a backflip
+    # has a residual of 27 % instead of 8 %.
     for ending in ("decay", "limited decay"):
         if attempt.near or attempt.cycle.kind != "open":
             break

@@ -145,7 +145,8 @@ class WellFormed:
     def lines(self) -> tuple[str, ...]:
         """The measures, a line each."""
         return (
-            f"soles in stance {1000 * self.lowest:.0f} to {1000 * self.highest:.0f} mm, tilted by "
+            f"soles in stance {1000 * self.lowest:.0f} to {1000 * self.highest:.0f} mm, at most "
+            f"{1000 * self.depth:.0f} mm below the floor at any time, tilted by "
             f"{np.rad2deg(self.tilt):.1f}°, skate {1000 * self.skate:.0f} mm "
             f"({1000 * self.slid:.0f} in the worst stance)",
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "

@@ -32,7 +32,8 @@ class BodyLines(NamedTuple):
     Attributes
     ----------
     hips, knees, ankles, shoulders, elbows, wrists, toes : array of shape (n, 2, 3)
-        Joints, left and right; NaN if the skeleton does not have them.
+        Joints, left and right; NaN if the skeleton does not have them. Of a body with one arm, the other shoulder is
+        estimated.
     top : array of shape (n, 3)
         Upper end of the trunk: the middle of the shoulders or, without arms, the head or the chest.
     has_arms : bool
@@ -162,16 +163,16 @@ def _check_extent(lines: BodyLines, motion: SourceMotion) -> None:
         raise MotionFileError(motion.path, 0, "hips and spine do not span a body", "offsets of a human")
 
 
-def _with_missing_shoulder(shoulders: Array, hips: Array, neck: Array) -> Array:
-    """Shoulders (n, 2, 3) of a body with one arm: as far from the line hips to neck as the other one, opposite to it.
+def _with_missing_shoulder(shoulders: Array, hips: Array, upper: Array) -> Array:
+    """Shoulders (n, 2, 3) of a body with one arm: as far from the line hips to head as the other one, opposite to it.
 
     Opposite is halfway between its mirror image, which an inclined neck turns, and the direction of the hips (n, 2, 3):
-    the chest of 20 captures without an arm turns by 4° in the median and 13° at most, by either alone by 25 and 29°.
+    the chest of 20 captures without an arm turns by 4° in the median and 13° at most; by either alone up to 25 and 29°.
     """
     for k in range(len(SIDES)):
         if np.isnan(shoulders[:, k]).any() and not np.isnan(shoulders[:, 1 - k]).any():
             middle = hips.mean(axis=1)
-            axis = unit(neck - middle)
+            axis = unit(upper - middle)
             inwards = _perpendicular(middle - shoulders[:, 1 - k], axis)
             across = unit(unit(inwards) + unit(_perpendicular(hips[:, k] - middle, axis)))
             shoulders[:, k] = shoulders[:, 1 - k] + 2.0 * np.linalg.norm(inwards, axis=1, keepdims=True) * across

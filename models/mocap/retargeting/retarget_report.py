@@ -149,7 +149,7 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
     if few:
         remark = "the soles' orientation is estimated from few frames"
         yield f"{remark} ({', '.join(few)}); give --rest-frame"
-    if sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
+    if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
         yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"

@@ -214,7 +214,7 @@ def test_invalid_lead_options_are_refused(options: dict, message: str) -> None:
 def test_resolved_configuration_contains_the_floor_scale() -> None:
     config = run_config(mode="lead")
     assert isinstance(config.map, LedMap)
-    maps = led_parts(config, config.map, (embedded("walk"),), figure_model())
+    maps = led_parts(config, (embedded("walk"),), figure_model())
     resolved = lead_parts(config, Lead(), maps).config
     assert isinstance(resolved, RunConfig)
     assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).walking.scale)

@@ -274,7 +274,11 @@ def test_feet_in_the_air_bear_no_load():
     assert not (schedule.pushing & high).any()
 
 
-@pytest.mark.parametrize("option", ["1:9", "two", "2:1"])
+def test_shortest_stated_cycle_is_accepted(walks):
+    assert close_or_rest(walks[1], "1.0:1.2").kind == "cycle"
+
+
+@pytest.mark.parametrize("option", ["1:9", "two", "2:1", "0:5.6", "1:1.19", "5.4:5.6"])
 def test_invalid_loop_option_is_refused(walks, option):
     with pytest.raises(ModelError, match=r"--loop .*expected"):
         close_or_rest(walks[1], option)
