@@ -5,13 +5,16 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.quaternions import arcs, exponential, rotated, unit
 
-# [rad] least flexion of the middle joint, for an end out of reach: 0.9999 of the length. Planned motions extend less:
-# to 0.99 in `legs.reaching`, so that knees stop gently; to 0.95 in `legs.stepping_limbs`, where the root is lowered
-# beyond it; to 0.998 in `flight.repair`, unless the clip itself extends its legs further.
+# [rad] least flexion of the middle joint, for an end out of reach: 0.9999 of the length. Others extend less: to 0.9995
+# in `models.mocap.dynamics.moved_legs`; to 0.99 in `legs.reaching`, so that knees stop gently; to 0.95 in
+# `legs.stepping_limbs`, where the root is lowered beyond it; to 0.998 in `flight.repair`, unless the clip itself
+# extends its legs further.
 MIN_FLEXION = 0.03
 
 
-def reach(a: Array, b: Array, axis: Array, line: Array, side: float | None = None) -> tuple[Array, Array]:
+def reach(
+    a: Array, b: Array, axis: Array, line: Array, side: float | None = None, min_flexion: float = MIN_FLEXION
+) -> tuple[Array, Array]:
     r"""Rotations of two links that bring their end onto given lines, as nearly as the links' lengths allow.
 
     With b turned by δ about the hinge, |a|² + |b|² + 2 (A + B cos δ + C sin δ) = |line|².
@@ -27,6 +30,8 @@ def reach(a: Array, b: Array, axis: Array, line: Array, side: float | None = Non
     side : float, optional
         Sign of the hinge's angle from flexed to straight; by default that of the mean, so that a knee that is
         hyperextended in some frames bends normally.
+    min_flexion : float
+        Least flexion of the middle joint, for an end out of reach [rad].
 
     Returns
     -------
@@ -37,7 +42,7 @@ def reach(a: Array, b: Array, axis: Array, line: Array, side: float | None = Non
     cosine, sine = np.sum(a * b, axis=1) - along, np.sum(a * np.cross(axis, b), axis=1)
     straight = np.arctan2(sine, cosine)
     wanted = (0.5 * (line**2 - a**2 - b**2).sum(axis=1) - along) / np.hypot(cosine, sine)
-    flexion = np.arccos(np.clip(wanted, -1.0, np.cos(MIN_FLEXION)))
+    flexion = np.arccos(np.clip(wanted, -1.0, np.cos(min_flexion)))
     turn = straight - np.sign(straight.mean() if side is None else side) * flexion
     bend = exponential(turn[:, None] * axis)
     return bend, arcs(unit(a + rotated(bend, b)), unit(line))

@@ -8,6 +8,7 @@ from geometry.two_links import reach
 from models.humanoid.skeleton import BODIES, figure_model
 from models.mocap.motion.kinematics import global_rotations, segment_positions
 
+_MIN_FLEXION = np.deg2rad(3.6)  # of a knee whose foot is out of reach: 0.9995 of the leg's length
 _CHAINS = tuple(
     tuple(BODIES.index(f"{side}_{part}") for part in ("thigh", "shank", "foot")) for side in ("left", "right")
 )
@@ -53,7 +54,7 @@ def displaced_with_planted_feet(poses: Array, shift: Array, planted: Array) -> A
         bent = sine > 0.03 * np.linalg.norm(thigh) * np.linalg.norm(shank)
         axis = np.where(bent[:, None], axis / np.maximum(sine, 1e-12)[:, None], side)
         displaced = np.abs(planted[:, leg]) * np.linalg.norm(shift, axis=1) > 1e-12
-        bend, swing = reach(upper, lower, axis, upper + lower - planted[:, leg, None] * shift, -1.0)
+        bend, swing = reach(upper, lower, axis, upper + lower - planted[:, leg, None] * shift, -1.0, _MIN_FLEXION)
         bend, swing = (np.where(displaced[:, None], turn, (1.0, 0.0, 0.0, 0.0)) for turn in (bend, swing))
         new_thigh = quaternions.product(swing, segments[:, first])
         new_shank = quaternions.product(swing, quaternions.product(bend, segments[:, second]))
