@@ -159,7 +159,7 @@ class Ground(NamedTuple):
     Attributes
     ----------
     footing : Array
-        Memory of the ends' footing (see `footing`); updated. If empty, ends are not held.
+        Memory of the ends' footing (see `stance_hold`); updated. If empty, ends are not held.
     soles : Array, shape (limbs, k, 3)
         Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
     contact, floor : float

@@ -245,7 +245,7 @@ class Led(KernelMap):
 
     Attributes
     ----------
-    flies, grounds : bool
+    flies, has_grounded_form : bool
         Whether it has flight phases at u = 0, and whether it has a form without the flight phases of its clip.
     sways : bool
         Whether the sway affects any of its forms.

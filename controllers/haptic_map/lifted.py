@@ -37,7 +37,7 @@ class Lifted(ClipMap):
 
     With limbs, in-betweens of neighbours are corrected (`pair_corrections`): feet move one at a time, while they are
     lifted. They stay above the floor (`floor`), and in stance they keep their place while the mixture changes
-    (`footing`).
+    (`stance_hold`).
 
     Neighbouring motions are seldom alike: a hand that is pushed from a walk onto a kick would require the figure to
     kick within a tenth of a second. `with_legs_of` takes root, legs and trunk from one clip, as `Cylindrical` does, and

@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.certificates.loop.executed import WorstState, examine_curve, examine_random_states
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.hand_samples import state_text as told_at
+from controllers.certificates.loop.hand_samples import state_text
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program
@@ -53,7 +53,7 @@ def check_executed(program: Program, main: River, reach: float, verdict: Verdict
         f"no oscillation grows at {judged} states of the program{limit_text}" if judged else "no state can be judged"
     )
     if abrupt:
-        summary += f"; at {len(abrupt)} more, as at {told_at(abrupt[0])}, its force jumps, is kinked or is no number"
+        summary += f"; at {len(abrupt)} more, as at {state_text(abrupt[0])}, its force jumps, is kinked or is no number"
     far = examine_curve(program, main, reach, hands.hands(), MAX_SPEED_RATIO)
     if far.radius >= 1.0:
         summary += f", but not for a hand {_place(main, far)}"

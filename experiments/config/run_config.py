@@ -236,7 +236,7 @@ def phantom_of(device: Phantom | Replay) -> Phantom:
     return device
 
 
-LONGEST_PERIOD = 0.01
+MAX_SERVO_PERIOD = 0.01
 """Longest servo period [s]: half the rate of a slower servo nears the 40 Hz above which oscillation is measured."""
 
 
@@ -252,12 +252,12 @@ class Clock:
         Time step of the physics [s]; divides the servo period.
     """
 
-    servo_period: Annotated[float, above(0.0, unit="s", most=LONGEST_PERIOD)] = 1e-3
+    servo_period: Annotated[float, above(0.0, unit="s", most=MAX_SERVO_PERIOD)] = 1e-3
     physics_step: Annotated[float, above(0.0, unit="s")] = 5e-4
 
 
 REPLAY_WITH_USER = "a replayed hand has no simulated user; leave out the user and what it does, or the replay"
-SEED = 1
+DEFAULT_SEED = 1
 """Seed of a run that is given none."""
 NO_SEED = "a replayed hand begins where it was recorded, whatever the seed; leave out the seed, or the replay"
 LEAD_WITHOUT_FIGURE = "the mode lead with the figure none: nobody to lead; expected another figure"
@@ -265,7 +265,7 @@ LEAD_WITHOUT_FIGURE = "the mode lead with the figure none: nobody to lead; expec
 
 def check_seed(device: Device, seed: int) -> None:
     """Refuse a seed beside a replayed hand."""
-    if isinstance(device, Replay) and seed != SEED:
+    if isinstance(device, Replay) and seed != DEFAULT_SEED:
         raise ParameterError(NO_SEED)
 
 
@@ -294,7 +294,7 @@ class RunConfig:
     device: Device = Phantom()
     clock: Clock = Clock()
     seconds: float = above(0.0, default=20.0, unit="s")
-    seed: int = whole_number(0, default=SEED)
+    seed: int = whole_number(0, default=DEFAULT_SEED)
 
     def __post_init__(self) -> None:
         if self.leads != isinstance(self.map, Led):

@@ -24,10 +24,12 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.fitting.hand_tours import domain, tour_along_curve, tour_of_domain
-from experiments.fitting.verdict import MAX_RESIDUAL, SECONDS, Trial, Verdict
+from experiments.fitting.verdict import SECONDS, Trial, Verdict
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
-_SHARES = (1.0, 0.5, 0.25, 0.0)
-_GOOD_RESIDUAL = MAX_RESIDUAL / 2  # [body weights] RMS residual up to which the first clip is taken at once
+_SHARES = (1.0, 0.5, 0.25, 0.0)  # λ of `with_share`, in the order in which they are tried
+# [body weights] RMS residual up to which the first clip is taken at once
+_GOOD_RESIDUAL = MAX_RESIDUAL_IN_FLIGHTS / 2
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 

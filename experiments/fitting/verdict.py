@@ -12,12 +12,9 @@ from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 from sim.compilation.sources import results_folder
 from sim.compilation.unit_workers import compile_units
-
-MAX_RESIDUAL = RESIDUAL_IN_FLIGHTS
-"""Largest acceptable RMS of the residual force [body weights]."""
 
 MAX_FOOT_SKATE = 0.02
 """Largest foot skate of a blend, in 95 % of the stances [m]: the bound of docs/validation/blended-motions.md."""
@@ -85,8 +82,8 @@ class Verdict(NamedTuple):
 
     @property
     def bearable(self) -> bool:
-        """Whether it does not fall and its residual is at most `MAX_RESIDUAL`."""
-        return not self.falls and self.residual <= MAX_RESIDUAL
+        """Whether it does not fall and its residual is at most `MAX_RESIDUAL_IN_FLIGHTS`."""
+        return not self.falls and self.residual <= MAX_RESIDUAL_IN_FLIGHTS
 
     def worse(self) -> tuple[float, float]:
         """Sort key that is larger for a worse verdict: first by an earlier fall, then by the residual."""

@@ -9,7 +9,7 @@ from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS, exceeding_text
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS, exceeding_text
 from models.mocap.preparation.laps import frame_distances
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
@@ -170,8 +170,8 @@ def advice(made: Prepared) -> tuple[str, ...]:
         return ()
     excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
     lacks = f"{100 * change.residual:.0f} % of weight"
-    if change.residual > RESIDUAL_IN_FLIGHTS:
-        bound = 100 * RESIDUAL_IN_FLIGHTS
+    if change.residual > MAX_RESIDUAL_IN_FLIGHTS:
+        bound = 100 * MAX_RESIDUAL_IN_FLIGHTS
         lacks = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
     return (
         f"no feasible motion is near: the last one tried turns joints by {np.rad2deg(change.turned):.0f}° and raises "

@@ -5,12 +5,12 @@ from time import process_time
 from typing import NamedTuple
 
 from models.mocap.motion.clip import Clip, pose_errors
-from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS, exceeding_text
+from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS, exceeding_text
 from sim.body.tracking import TrackingConfig, report, tracked_motion
 from sim.compilation.units import Unit
 
-SECONDS = 20.0  # default duration of a trial
-MAX_ROOT_ERROR = 1.0  # distance of the root from its reference that counts as a fall [m]
+TRIAL_SECONDS = 20.0  # default duration of a trial
+MAX_ROOT_TRACKING_ERROR = 1.0  # distance of the root from its reference that counts as a fall [m]
 
 
 class Followed(NamedTuple):
@@ -21,7 +21,7 @@ class Followed(NamedTuple):
     residual : float
         RMS residual force while the reference stands, until the end of a clip that is not repeated [body weights].
     fell : float or None
-        Time at which it first fell, or its root was `MAX_ROOT_ERROR` from its reference [s]; None if it did not fall.
+        Time at which it fell, or its root was `MAX_ROOT_TRACKING_ERROR` from its reference [s]; None if neither.
     seconds : float
         Duration of the trial [s].
     cost : float
@@ -35,8 +35,8 @@ class Followed(NamedTuple):
 
     @property
     def stands(self) -> bool:
-        """Whether it did not fall and its residual is at most `RESIDUAL_IN_FLIGHTS`."""
-        return self.fell is None and self.residual <= RESIDUAL_IN_FLIGHTS
+        """Whether it did not fall and its residual is at most `MAX_RESIDUAL_IN_FLIGHTS`."""
+        return self.fell is None and self.residual <= MAX_RESIDUAL_IN_FLIGHTS
 
     def __str__(self) -> str:
         """Residual in percent, with the time of a fall in brackets."""
@@ -51,7 +51,7 @@ class Followed(NamedTuple):
 
     def faults(self, leaps: bool) -> tuple[str, ...]:
         """Faults, a line each; `leaps` says whether the clip has flights, which raises the bound of the residual."""
-        bound = RESIDUAL_IN_FLIGHTS if leaps else MAX_RESIDUAL
+        bound = MAX_RESIDUAL_IN_FLIGHTS if leaps else MAX_RESIDUAL
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:
@@ -61,7 +61,7 @@ class Followed(NamedTuple):
 
 
 def followed(
-    clip: Clip, seconds: float = SECONDS, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
+    clip: Clip, seconds: float = TRIAL_SECONDS, ready: Callable[[tuple[Unit, ...]], None] = lambda units: None
 ) -> Followed:
     """Let the physical figure track a clip; `ready` is called with the compilation units that this needs."""
     began = process_time()
@@ -69,5 +69,5 @@ def followed(
     cost = (process_time() - began) / seconds
     root_errors = pose_errors(motion.poses, motion.reference.poses)[1]
     tracking = report(motion)
-    fall_times = [*motion.reference.times[root_errors > MAX_ROOT_ERROR][:1].tolist(), *tracking.falls[:1]]
+    fall_times = [*motion.reference.times[root_errors > MAX_ROOT_TRACKING_ERROR][:1].tolist(), *tracking.falls[:1]]
     return Followed(tracking.stance.force_rms, min(fall_times, default=None), seconds, cost)

@@ -15,7 +15,7 @@ from experiments.preparation.tracking_trial import followed
 from experiments.studies.random_sets import JUDGING, TUNING
 from models.errors import ModelError
 from models.mocap.library import embedded
-from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
@@ -35,7 +35,8 @@ def row(path: Path, made: Prepared) -> str:
     before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
     most, directions, places = kept.extremes[0], *_source_deviations(path, made)
-    why = "" if after.stands else "motion" if not made.near or change.residual > RESIDUAL_IN_FLIGHTS / 2 else "figure"
+    motion_is_near = made.near and change.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
+    why = "" if after.stands else "figure" if motion_is_near else "motion"
     cells = (
         _file_name(path),
         _half_name(path),

@@ -125,7 +125,7 @@ def _differentiate(reference: CompiledReference) -> None:
 
 @njit
 def _lower_poses(reference: CompiledReference) -> None:
-    """Lower the poses now, one period before and one period after to the floor by the share s, see `settling`."""
+    """Lower the poses now, one period before and one period after to the floor by the share s, see `floor_lowering`."""
     s, period, transition = reference.settled, reference.period, reference.transition
     for sign, pose in ((0.0, reference.pose), (-1.0, reference.before), (1.0, reference.after)):
         share = s[0] + sign * period * s[1] + 0.5 * (sign * period) ** 2 * s[2]

@@ -15,7 +15,7 @@ from sim.users.person.person_state import PersonState
 from sim.users.person.random_numbers import fresh_chance
 from sim.users.person.wishes import Wishes
 
-LONGEST_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
+MAX_PERSON_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
 _TREMOR_QUALITY = 4.0  # quality factor of the tremor's resonance: a peak about 2 Hz wide
 
 
@@ -57,10 +57,10 @@ class Participant:
             If either is too long for this person, or her own intent cannot be compiled.
         """
         person = self.person
-        if period > LONGEST_PERIOD:
+        if period > MAX_PERSON_PERIOD:
             raise SimError(
                 f"a servo period of {period:g} s is too long for a person, who has reflexes within 0.03 s; "
-                f"expected {LONGEST_PERIOD:g} s or less"
+                f"expected {MAX_PERSON_PERIOD:g} s or less"
             )
         check_steps(person, physics_step)
         inertia, stiffness, damping = arm_matrices(person)

@@ -8,12 +8,9 @@ from controllers.curves.trajectory import Trajectory
 from controllers.state import HandState
 from geometry.arrays import Array
 
-HANDS = 50  # states of the hand at which a law is compared with its expression
-MIN_DISTANCE, MAX_DISTANCE = (
-    1e-5,
-    5e-3,
-)  # [m] distance from the curve: from the encoders' rounding to a fifth of a map's reach
-MIN_SPEED, MAX_SPEED = 1e-3, 0.1  # [m/s] speed relative to the curve's motion, up to that of a hand that pushes
+_N_STATES = 50  # states of the hand at which a law is compared with its expression
+_MIN_DISTANCE, _MAX_DISTANCE = 1e-5, 5e-3  # [m] from the curve: from encoders' rounding to a fifth of a map's reach
+_MIN_SPEED, _MAX_SPEED = 1e-3, 0.1  # [m/s] relative to the curve's motion, up to that of a hand that pushes
 _SEED = 3
 
 
@@ -25,16 +22,16 @@ class States(NamedTuple):
     v: Array
 
 
-def states_about(curve: Trajectory, n: int = HANDS) -> States:
+def states_about(curve: Trajectory) -> States:
     """States near a curve, at 0 to 1.5 times its speed, with deviations of all orders of magnitude."""
-    rng = np.random.default_rng(_SEED)
+    rng, n = np.random.default_rng(_SEED), _N_STATES
     # Away from the ends of an open curve, where it may stand still.
     phases = curve.start + curve.duration * rng.uniform(0.01, 0.99, size=n)
     offset, relative_velocity = (rng.normal(size=(n, 3)) for _ in range(2))
-    offset *= np.geomspace(MIN_DISTANCE, MAX_DISTANCE, n)[rng.permutation(n), None] / np.linalg.norm(
+    offset *= np.geomspace(_MIN_DISTANCE, _MAX_DISTANCE, n)[rng.permutation(n), None] / np.linalg.norm(
         offset, axis=1, keepdims=True
     )
-    relative_velocity *= np.geomspace(MIN_SPEED, MAX_SPEED, n)[rng.permutation(n), None] / np.linalg.norm(
+    relative_velocity *= np.geomspace(_MIN_SPEED, _MAX_SPEED, n)[rng.permutation(n), None] / np.linalg.norm(
         relative_velocity, axis=1, keepdims=True
     )
     pace = rng.choice([0.0, 0.5, 1.0, 1.5], size=(n, 1))

@@ -182,11 +182,11 @@ def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol
 
 
 def executed(law: FunctionLaw, curve: Trajectory, backwards: bool = False) -> Array:
-    """Six numbers of a law as a run evaluates it, at the hands about a curve, in reverse order if `backwards`, (n, 6).
+    """Six numbers of a law as a run evaluates it, at the hands about a curve, the last first if `backwards`; (n, 6).
 
     Raises
     ------
-    NotFollowed
+    NotExecutable
         If the function returns a symbol from an earlier symbolic execution.
     ParameterError
         If the function raises, or does not return three or six numbers.

@@ -20,7 +20,7 @@ from experiments.results.measures.summary import RunSummary
 from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
-from experiments.setups.parts.clips import MIN_FLIGHT_DURATION
+from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.hands import (
     PAUSE,
@@ -142,7 +142,7 @@ def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ..
     over: list[str] = []
     for clip in clips:
         air = ~contacts(clip).supported
-        if max((end - start for start, end in spans(air)), default=0) <= MIN_FLIGHT_DURATION * clip.fps:
+        if max((end - start for start, end in spans(air)), default=0) <= MIN_CLIP_FLIGHT_DURATION * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.

@@ -8,7 +8,7 @@ from models.errors import ModelError
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 
-MIN_FLIGHT_DURATION = 0.05
+MIN_CLIP_FLIGHT_DURATION = 0.05
 """Shortest flight of a clip that counts [s]: half or twice this value changes none of eight captures that are led."""
 
 

@@ -15,7 +15,7 @@ from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
 from experiments.fitting.balance import balanced_on_ground
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.parts.clips import MIN_FLIGHT_DURATION, load_clips
+from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION, load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
 from geometry.arrays import Mask
@@ -138,7 +138,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
 
     Contact marks are cleaned in three steps. A foot that is up for less than `_MIN_SWING_TIME` stands throughout. Where
     no foot is settled, a foot that was in stance and is still planted stays in stance: it has not left the floor, but
-    sunk into it. A flight shorter than `MIN_FLIGHT_DURATION` is ignored: the feet in stance before it stay in stance.
+    sunk into it. A flight shorter than `MIN_CLIP_FLIGHT_DURATION` is ignored: feet in stance before it stay in stance.
     """
     stands, rests = marks.settled[:-1], marks.planted[:-1]
     n = len(stands)
@@ -152,7 +152,7 @@ def stances(marks: Contacts, fps: float) -> Mask:
             if not stands[sample % n].any():
                 break
     for start, end in runs(~np.any(stands, axis=1)):
-        if end - start < MIN_FLIGHT_DURATION * fps:
+        if end - start < MIN_CLIP_FLIGHT_DURATION * fps:
             stands[np.arange(start, end) % n] = stands[start - 1]
     return stands
 

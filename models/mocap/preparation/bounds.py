@@ -10,7 +10,7 @@ MAX_SOLE_DEPTH = 0.01
 MAX_SKATE = 0.005  # foot skate in a stance [m]
 # RMS residual force [body weights]. For gaits and gestures, the bound of Hicks et al. (2015); for motions with flights,
 # the residual that the preparation's prototype left in fighting and jumping jacks (11 and 12 %).
-MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS = 0.05, 0.12
+MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS = 0.05, 0.12
 MAX_SEAM_VELOCITY_JUMP = 0.3  # difference of the velocities at a closed clip's ends [rad/s, m/s]
 MAX_END_SPEED = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
 MAX_LIMIT_EXCESS = np.deg2rad(

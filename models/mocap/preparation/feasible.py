@@ -137,7 +137,7 @@ class _Errors(NamedTuple):
         Residual wrench [N], [N m].
     grip : array, shape (m, 4k)
         Contact forces along the edges of the friction pyramids [N].
-    share : array, shape (m, 51)
+    torque_ratio : array, shape (m, 51)
         Joint torques as fractions of their limits.
     """
 
@@ -234,7 +234,7 @@ class _Problem:
         return x, costs
 
     def _linearise(self, x: Array) -> tuple[NormalEquations, Array]:
-        """NormalEquations equations and half the gradient of the cost."""
+        """Normal equations and half the gradient of the cost."""
         change = self.change
         system, parts = self.fixed.copy(), np.zeros((change.intervals, (DEGREE + 1) * N_TANGENT))
         for start in range(0, change.intervals, _CHUNK):

@@ -14,7 +14,7 @@ from models.mocap.preparation.poses import resampled
 
 # Largest RMS distances of the joints, for a gait and for another motion [rad], and of the root [m]. In a prototype of
 # the preparation, joints changed by 1.7 to 3° in gaits and by 7 to 8° in fighting and a punch, roots by 2.3 to 6.6 cm.
-MAX_GAIT_JOINT_DISTANCE, MAX_JOINT_DISTANCE, MAX_ROOT_ERROR = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
+MAX_GAIT_JOINT_DISTANCE, MAX_JOINT_DISTANCE, MAX_ROOT_DISTANCE = np.deg2rad(3.0), np.deg2rad(8.0), 0.05
 # Distance from the root of the points to its left that determine its heading [m], an arm's length. Half or twice the
 # value changes the distances of the roots by at most 0.8 cm in the 28 captures of docs/validation/prepared-captures.md.
 _HEADING_LEVER = 0.7
@@ -49,8 +49,8 @@ class Fidelity(NamedTuple):
     joints : float
         RMS over joints and time of the angle between their rotations [rad].
     root : float
-        RMS distance of the roots [m], over the floor after the best displacement of the body on it.
-    extremes : tuple of Extreme
+        RMS distance of the roots [m], after the displacement of the body over the floor that fits best.
+    extremes : tuple of WorstJoint
         The five joints that differ most, the largest first.
     gait : bool
         Whether the clip is a gait, for which the bound is tighter.
@@ -67,9 +67,9 @@ class Fidelity(NamedTuple):
         if self.joints > (bound := MAX_GAIT_JOINT_DISTANCE if self.gait else MAX_JOINT_DISTANCE):
             far, most = exceeding_text(np.rad2deg(self.joints), np.rad2deg(bound)), f"{np.rad2deg(bound):.0f}"
             found.append(f"joints are {far}° RMS from the capture; {most} at most")
-        if self.root > MAX_ROOT_ERROR:
-            far = exceeding_text(100 * self.root, 100 * MAX_ROOT_ERROR)
-            found.append(f"the root is {far} cm RMS from the capture; {100 * MAX_ROOT_ERROR:.0f} at most")
+        if self.root > MAX_ROOT_DISTANCE:
+            far = exceeding_text(100 * self.root, 100 * MAX_ROOT_DISTANCE)
+            found.append(f"the root is {far} cm RMS from the capture; {100 * MAX_ROOT_DISTANCE:.0f} at most")
         return tuple(found)
 
     def line(self) -> str:
@@ -93,7 +93,7 @@ def fidelity(clip: Clip, captured: Clip, part: LoopedClip, pace: float) -> Fidel
         The prepared clip.
     captured : Clip
         The calibrated capture, before loop, filter and dynamics.
-    part : Looped
+    part : LoopedClip
         The part of the paced capture from which the clip was made.
     pace : float
         Playback speed of the clip, relative to the capture's.

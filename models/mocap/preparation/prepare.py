@@ -15,7 +15,7 @@ from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import RESIDUAL_IN_FLIGHTS
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest
@@ -172,7 +172,7 @@ def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> _Attempt:
     near = (
         result.turned < _MAX_ROTATION_CHANGE
         and result.raised < _MAX_HEIGHT_CHANGE
-        and result.residual < RESIDUAL_IN_FLIGHTS
+        and result.residual < MAX_RESIDUAL_IN_FLIGHTS
         and _range_excess(result.clip) < max(_range_excess(captured), 0.0) + _MAX_ADDED_EXCESS
     )
     return _Attempt(cycle, planted, schedule, result, near)

@@ -21,13 +21,13 @@ from models.mocap.preparation.bounds import (
     MAX_FLIGHT_ACCELERATION_ERROR,
     MAX_LIMIT_EXCESS,
     MAX_RESIDUAL,
+    MAX_RESIDUAL_IN_FLIGHTS,
     MAX_SEAM_VELOCITY_JUMP,
     MAX_SKATE,
     MAX_SOLE_DEPTH,
     MAX_SOLE_HEIGHT,
     MAX_SOLE_TILT,
     MIN_SOLE_HEIGHT,
-    RESIDUAL_IN_FLIGHTS,
     exceeding_text,
 )
 from models.mocap.preparation.feasible import ContactForces, contact_forces
@@ -131,7 +131,7 @@ class WellFormed:
             )
         if self.excess > MAX_LIMIT_EXCESS:
             found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
-        if self.residual > (bound := RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
+        if self.residual > (bound := MAX_RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
             found.append(
                 f"contact leaves a residual of {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
                 f"{100 * bound:.0f} % at most"

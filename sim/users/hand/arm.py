@@ -25,7 +25,7 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
     ----------
     pushes : Array
         A `sim.users.hand.actions.push_table` of n pushes.
-    push_start_times : Array
+    begun : Array
         When each push began [s], NaN if it has not; shape (n,), updated.
     t : float
         Time [s].

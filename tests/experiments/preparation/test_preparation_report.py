@@ -8,7 +8,7 @@ from experiments.preparation.prepared_file import changes, doubts
 from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.bounds import MAX_RESIDUAL, RESIDUAL_IN_FLIGHTS
+from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.fidelity import fidelity
 from models.mocap.preparation.looping import LoopedClip
@@ -45,8 +45,8 @@ def test_flights_raise_the_residual_bound():
     run = embedded("run")
     measures = well_formed(run, clip_flights(run))
     assert measures.flights > 0
-    assert MAX_RESIDUAL < RESIDUAL_IN_FLIGHTS
-    lacking = type(measures)(**{**vars(measures), "residual": (MAX_RESIDUAL + RESIDUAL_IN_FLIGHTS) / 2.0})
+    assert MAX_RESIDUAL < MAX_RESIDUAL_IN_FLIGHTS
+    lacking = type(measures)(**{**vars(measures), "residual": (MAX_RESIDUAL + MAX_RESIDUAL_IN_FLIGHTS) / 2.0})
     assert not any("contact leaves a residual of" in line for line in lacking.faults())
     assert any(
         "contact leaves a residual of" in line for line in type(measures)(**{**vars(lacking), "flights": 0}).faults()
