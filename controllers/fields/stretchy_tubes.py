@@ -115,12 +115,11 @@ def _push_curve(radius: float, memory: Array, slot: int, p: Array) -> float:
     for i in range(3):
         depth -= (p[i] - memory[record + ANCHOR + i]) * memory[slot + _NORMAL + i]
     if depth > 0.0:
-        x, y, z = (
-            memory[record + ANCHOR] - depth * memory[slot + _NORMAL],
-            memory[record + ANCHOR + 1] - depth * memory[slot + _NORMAL + 1],
-            memory[record + ANCHOR + 2] - depth * memory[slot + _NORMAL + 2],
-        )
-        drag_to(memory, record, x, y, z)
+        a, n = record + ANCHOR, slot + _NORMAL
+        drag_to(
+            memory, record, memory[a] - depth * memory[n], memory[a + 1] - depth * memory[n + 1],
+            memory[a + 2] - depth * memory[n + 2],
+        )  # fmt: skip
         return depth
     discard_edit(memory, record)
     memory[slot + _MODE] = PROBING

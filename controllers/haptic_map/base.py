@@ -10,7 +10,7 @@ from controllers.checks import numbers_of
 from controllers.errors import ParameterError
 from controllers.haptic_map.map_stages import CompiledMap, register
 from controllers.haptic_map.own_map import (
-    FIGURE,
+    N_FIGURE_POSE,
     PythonCallback,
     check_derivative,
     checked_jacobian,
@@ -165,7 +165,7 @@ class KernelMap(HapticMap):
     @property
     def nq(self) -> int:
         """Numbers of a configuration: 75, those of the figure."""
-        return FIGURE
+        return N_FIGURE_POSE
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel; by default it has no memory."""

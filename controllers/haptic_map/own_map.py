@@ -22,7 +22,7 @@ _DOUBLE_POINTER = ctypes.POINTER(ctypes.c_double)
 _CALLBACK_TYPE = ctypes.CFUNCTYPE(
     None, _DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER, ctypes.c_int64, ctypes.c_int64
 )
-FIGURE = 75
+N_FIGURE_POSE = 75
 """Numbers of a pose of the figure: root position, root quaternion and 17 joint quaternions."""
 _NORM_TOLERANCE = 1e-3  # largest error of a quaternion's norm: more than single precision, less than an arbitrary scale
 # [m, rad] step of central differences: cube root of the rounding error, for lengths of some centimetres
@@ -108,11 +108,11 @@ def checked_pose(pose: Any, nq: int, name: str, x: Array) -> Pose:
     """
     numbers = numbers_of(f"the pose of map {name} at {_where(x)}", pose)
     if numbers.shape != (nq,) or not np.isfinite(numbers).all():
-        many = "" if numbers.shape != (nq,) else f" with {numbers[~np.isfinite(numbers)][0]} in it"
+        which = "" if numbers.shape != (nq,) else f" with {numbers[~np.isfinite(numbers)][0]} in it"
         raise ParameterError(
-            f"map {name} gave a pose of shape {numbers.shape}{many} at {_where(x)}; expected {nq} finite numbers"
+            f"map {name} gave a pose of shape {numbers.shape}{which} at {_where(x)}; expected {nq} finite numbers"
         )
-    if nq == FIGURE:
+    if nq == N_FIGURE_POSE:
         norms = np.sqrt((numbers[3:].reshape(-1, 4) ** 2).sum(axis=1))
         worst = int(np.argmax(np.abs(norms - 1.0)))
         if abs(norms[worst] - 1.0) > _NORM_TOLERANCE:
@@ -184,22 +184,22 @@ def difference(before: Pose, after: Pose) -> Array:
     return np.concatenate(parts)
 
 
-def finite_differences(pose: Callable[[Array], Pose], x: Array, of: float = _DIFFERENCE_STEP) -> Array:
+def finite_differences(pose: Callable[[Array], Pose], x: Array, step: float = _DIFFERENCE_STEP) -> Array:
     """Derivative of a map at a stylus pose (7,) by central differences of a step [m, rad], shape (nv, 6)."""
     columns: list[Array] = []
     for k in range(6):
-        before, after = (_displace(x, k, step) for step in (-of, of))
-        columns.append(difference(pose(before), pose(after)) / (2.0 * of))
+        before, after = (_displace(x, k, distance) for distance in (-step, step))
+        columns.append(difference(pose(before), pose(after)) / (2.0 * step))
     return np.stack(columns, axis=1)
 
 
-def _displace(x: Array, k: int, step: float) -> Array:
-    """A stylus pose moved along, or turned about, an axis of H."""
+def _displace(x: Array, k: int, distance: float) -> Array:
+    """A stylus pose moved along axis k of H, or turned about axis k − 3, by a distance [m] or an angle [rad]."""
     moved = x.copy()
     if k < 3:
-        moved[k] += step
+        moved[k] += distance
         return moved
     turn = np.zeros(4)
-    turn[0], turn[1 + k - 3] = np.cos(0.5 * step), np.sin(0.5 * step)
+    turn[0], turn[k - 2] = np.cos(0.5 * distance), np.sin(0.5 * distance)
     moved[3:] = multiply(*turn, *x[3:])
     return moved

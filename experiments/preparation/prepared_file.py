@@ -169,14 +169,14 @@ def advice(made: Prepared) -> tuple[str, ...]:
     if made.near:
         return ()
     excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
-    lacks = f"{100 * change.residual:.0f} % of weight"
+    residual = f"{100 * change.residual:.0f} % of weight"
     if change.residual > MAX_RESIDUAL_IN_FLIGHTS:
         bound = 100 * MAX_RESIDUAL_IN_FLIGHTS
-        lacks = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
+        residual = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
     return (
         f"no feasible motion is near: the last one tried turns joints by {np.rad2deg(change.turned):.0f}° and raises "
         f"or lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
-        f"range, and leaves a residual of {lacks}",
+        f"range, and leaves a residual of {residual}",
         "try --loop START:END for a part without what is not feasible, "
         + ("" if made.looped.kind == "open" else "--loop open if it does not repeat, ")
         + "or a capture whose support is feet and hands alone",

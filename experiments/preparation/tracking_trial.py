@@ -44,10 +44,10 @@ class Followed(NamedTuple):
 
     def line(self) -> str:
         """The result in words."""
-        lacks = f"{100 * self.residual:.1f} % of weight"
+        residual = f"{100 * self.residual:.1f} % of weight"
         if self.fell is not None:
-            return f"the physical figure falls at {self.fell:.1f} s, with a residual of {lacks} up to then"
-        return f"the physical figure follows it for {self.seconds:.0f} s with a residual of {lacks}"
+            return f"the physical figure falls at {self.fell:.1f} s, with a residual of {residual} up to then"
+        return f"the physical figure follows it for {self.seconds:.0f} s with a residual of {residual}"
 
     def faults(self, leaps: bool) -> tuple[str, ...]:
         """Faults, a line each; `leaps` says whether the clip has flights, which raises the bound of the residual."""
@@ -55,8 +55,8 @@ class Followed(NamedTuple):
         if self.fell is not None:
             return (f"the physical figure falls at {self.fell:.1f} s",)
         if self.residual > bound:
-            lacks = exceeding_text(100 * self.residual, 100 * bound)
-            return (f"the physical figure has a residual of {lacks} % of weight; {100 * bound:.0f} at most",)
+            residual = exceeding_text(100 * self.residual, 100 * bound)
+            return (f"the physical figure has a residual of {residual} % of weight; {100 * bound:.0f} at most",)
         return ()
 
 

@@ -80,7 +80,6 @@ class Course(NamedTuple):
 def course(config: RunConfig, step: float) -> Course:
     """Run a configuration at a step of the physics [s]."""
     clock = replace(config.clock, physics_step=step)
-
     session = wire(replace(config, clock=clock), ready=compiler(Console(stderr=True)))
     servo, world = session.servo, session.world
     own = slice(world.pose_at, world.pose_at + world.body.nq)

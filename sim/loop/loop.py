@@ -91,7 +91,6 @@ class Loop:
     python_laws : sequence of callable
         `Program.python_laws` of the servo's field: each maps the measured hand to a wrench of six numbers. If there are
         any, blocks run tick by tick: the hand is sensed, the laws are called, the compiled loop does the rest.
-
     before_tick : callable, optional
         Called with the number of each tick before it runs, for example by a driver in Python that writes the readings
         of an `Exchange` and takes its commands; it may wait for the time of the tick. Blocks then run tick by tick.

@@ -104,10 +104,10 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
 @njit
 def dwell_complete(transition: Transition, river: float, period: float) -> bool:
     """Whether the river that would take over (−1: none) has been active for the dwell time; call it every period."""
-    rival = transition.candidate_river
-    rival[1] = rival[1] + period if river == rival[0] else 0.0
-    rival[0] = river
-    return river >= 0.0 and rival[1] >= DWELL_TIME
+    candidate = transition.candidate_river
+    candidate[1] = candidate[1] + period if river == candidate[0] else 0.0
+    candidate[0] = river
+    return river >= 0.0 and candidate[1] >= DWELL_TIME
 
 
 @njit

@@ -4,7 +4,7 @@ import numpy as np
 
 # Heights of soles in stance [m]; the preparation's prototype left a penetration of 3 mm.
 MIN_SOLE_HEIGHT, MAX_SOLE_HEIGHT = -0.003, 0.005
-MAX_SOLE_TILT = np.deg2rad(2.0)  # largest tilt of soles in stance
+MAX_SOLE_TILT = np.deg2rad(2.0)  # of soles in stance
 # Depth of any sole at any time [m]: those that swing are the lower by low-pass filtering, up to 6 mm in 50 clips.
 MAX_SOLE_DEPTH = 0.01
 MAX_SKATE = 0.005  # foot skate in a stance [m]
@@ -13,9 +13,7 @@ MAX_SKATE = 0.005  # foot skate in a stance [m]
 MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS = 0.05, 0.12
 MAX_SEAM_VELOCITY_JUMP = 0.3  # difference of the velocities at a closed clip's ends [rad/s, m/s]
 MAX_END_SPEED = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
-MAX_LIMIT_EXCESS = np.deg2rad(
-    1.0
-)  # excess over a joint's range: Euler angles and rotation vectors differ by as much near limits
+MAX_LIMIT_EXCESS = np.deg2rad(1.0)  # over a joint's range: Euler angles and rotation vectors differ by this near limits
 MAX_FLIGHT_ACCELERATION_ERROR = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
 
 

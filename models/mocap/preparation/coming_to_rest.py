@@ -20,8 +20,8 @@ _REST_TIME_PER_SPEED, _MAX_REST_TIME = 0.2, 0.8
 # A body walks at an end if its root is faster than this [m/s], its chest tilts by less than this, and its lower foot is
 # below this [m].
 _MIN_WALKING_SPEED, _MIN_WALKING_COSINE, _MAX_SUPPORT_HEIGHT = 0.3, np.cos(np.deg2rad(30.0)), 0.05
-# Time in which a walking body comes to stand [s]. A run that is cut anywhere lacks 3.6 % of its weight; with 0.6 s it
-# lacks 7.2, with 1.3 s 2.9, and its root is 13 cm lower instead of 6. Two walks differ by 1.0 points and 0.7° at most.
+# Time in which a walking body comes to stand [s]. A run that is cut anywhere has a residual of 3.6 % of weight; with
+# 0.6 s 7.2 %, with 1.3 s 2.9 %, and its root is 13 cm lower, not 6. Two walks differ by 1.0 points and 0.7° at most.
 _STOP_TIME = 0.9
 # Flexion of the hip in the last step, and half of the knee's [rad]: the foot clears the floor.
 _STEP_FLEXION = np.deg2rad(30.0)

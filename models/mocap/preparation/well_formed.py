@@ -97,49 +97,23 @@ class WellFormed:
 
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
-        found: list[str] = []
-        if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT:
-            found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
-        if self.depth > MAX_SOLE_DEPTH:
-            found.append(
-                f"a sole goes {exceeding_text(1000 * self.depth, 1000 * MAX_SOLE_DEPTH)} mm below the floor; "
-                f"{1000 * MAX_SOLE_DEPTH:.0f} at most"
-            )
-        if self.tilt > MAX_SOLE_TILT:
-            found.append(f"soles are tilted by {exceeding_text(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
-        if self.skate > MAX_SKATE:
-            found.append(
-                f"feet skate by {exceeding_text(1000 * self.skate, 1000 * MAX_SKATE)} mm in a stance; "
-                f"{1000 * MAX_SKATE:.0f} at most"
-            )
-        if self.outliers:
-            found.append(f"{self.outliers} frames are outliers in acceleration; 0 at most")
-        if self.closed and self.seam > MAX_SEAM_VELOCITY_JUMP:
-            found.append(
-                f"velocities at the seam differ by {exceeding_text(self.seam, MAX_SEAM_VELOCITY_JUMP)} rad/s; "
-                f"{MAX_SEAM_VELOCITY_JUMP} at most"
-            )
-        if not self.closed and self.seam > MAX_END_SPEED:
-            found.append(
-                f"an end moves with {exceeding_text(self.seam, MAX_END_SPEED)} rad/s; rest at both, "
-                f"{MAX_END_SPEED} at most"
-            )
-        if self.flight_error > MAX_FLIGHT_ACCELERATION_ERROR:
-            found.append(
-                f"flights differ from gravity by {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} "
-                f"m/s²; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
-            )
-        if self.excess > MAX_LIMIT_EXCESS:
-            found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
-        if self.residual > (bound := MAX_RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
-            found.append(
-                f"contact leaves a residual of {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
-                f"{100 * bound:.0f} % at most"
-            )
-        if self.strain > 1.0:
-            found.append(
-                f"{self.joint} needs {exceeding_text(100 * self.strain, 100.0)} % of its torque limit; 100 % at most"
-            )
+        stands_at = f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm"
+        stand = f"−{-1000 * MIN_SOLE_HEIGHT:.0f} to {1000 * MAX_SOLE_HEIGHT:.0f}"
+        found = [f"{stands_at}; {stand}"] if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT else []
+        most = MAX_RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL
+        rows = (
+            (1000 * self.depth, 1000 * MAX_SOLE_DEPTH, "a sole goes {} mm below the floor; {:g} at most"),
+            (np.rad2deg(self.tilt), np.rad2deg(MAX_SOLE_TILT), "soles are tilted by {}°; {:g}° at most"),
+            (1000 * self.skate, 1000 * MAX_SKATE, "feet skate by {} mm in a stance; {:g} at most"),
+            (self.outliers, 0, f"{self.outliers} frames are outliers in acceleration; 0 at most"),
+            (self.seam, MAX_SEAM_VELOCITY_JUMP, "velocities at the seam differ by {} rad/s; {:g} at most")
+            if self.closed else (self.seam, MAX_END_SPEED, "an end moves with {} rad/s; rest at both, {:g} at most"),
+            (self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR, "flights differ from gravity by {} m/s²; {:g} at most"),
+            (np.rad2deg(self.excess), np.rad2deg(MAX_LIMIT_EXCESS), "a joint is {}° beyond its range; {:g}° at most"),
+            (100 * self.residual, 100 * most, "contact leaves a residual of {} % of weight RMS; {:g} % at most"),
+            (100 * self.strain, 100, f"{self.joint} needs {{}} % of its torque limit; {{:g}} % at most"),
+        )  # fmt: skip
+        found += [text.format(exceeding_text(value, bound), bound) for value, bound, text in rows if value > bound]
         return tuple(found)
 
     def lines(self) -> tuple[str, ...]:
