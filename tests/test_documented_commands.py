@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from experiments import commands as hvf_commands
-from experiments.studies.row_spread import README, stated_residuals
+from experiments.studies.residual_spread import README, stated_residuals
 from tests.test_docs import DOCS, PAGES, ROOT, blocks, commands, name
 
 FALLING = ["hvf run --clips backflip --governor"]  # as their pages say
@@ -33,7 +33,7 @@ COMMAND_PAGES = [page for page in PAGES if page == ROOT / "README.md" or page.pa
 NAMES = [[command] for command in hvf_commands.NAMES if command != "clips"] + [["COMMAND", "--help"]]
 EXPLANATIONS = [page for page in PAGES if page.parent == DOCS / "explanation"]
 ROW = re.compile(r"^\| [^|]+ \| `(hvf run [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
-SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors that were not tried (`row_spread`)
+SPREAD = 1.5  # points of residual beyond what a row says, for seeds and processors not tried (`residual_spread`)
 CLOCKED, PAUSED = "hvf hardware run", ("no new reading for", "the servo was")  # output on a machine that pauses
 MISSED = re.compile(r"(\d+) ticks, (\d+) deadlines missed")
 MAX_MISSED_SHARE = 0.05  # of the deadlines: with more missed, a run on a device is not judged

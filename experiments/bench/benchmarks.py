@@ -20,10 +20,10 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HandState, stylus_path
-from experiments.bench.figures import BenchmarkResult
 from experiments.bench.part_costs import heaviest_field, picture_microseconds, recorder_cost, tick_microseconds
 from experiments.bench.prepare_cost import prepare_cost
-from experiments.bench.tick_cost import MODES, STEP, figure_cost, prepared, tick_cost
+from experiments.bench.results import BenchmarkResult
+from experiments.bench.tick_cost import MODES, PHYSICS_STEP, figure_cost, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost
 from experiments.certify.certify import CERTIFICATE
 from experiments.config.modes import JointWalls
@@ -49,16 +49,15 @@ _LIBRARY_IMPORTS = "import mujoco, numba, h5py, scipy.interpolate, rich, pydanti
 """Imports that any program of these libraries needs before its first tick."""
 
 
-def figures() -> Iterator[BenchmarkResult]:
-    """Yield every figure with its bounds as it is measured; bounds are ratios within one run.
+def benchmark_results() -> Iterator[BenchmarkResult]:
+    """Yield every result with its bounds as it is measured; bounds are ratios within one run.
 
     The unit `mj_steps` is the time of a bare `mj_step` of the demo's world on this machine.
     """
     costs = {name: tick_cost(make()) for name, make in MODES.items()}
     step = costs["follow"].step
-    yield BenchmarkResult(
-        "simulated seconds per second, physics and servo at 1 kHz, figure at 500 Hz", STEP / costs["follow"].tick
-    )
+    speed = PHYSICS_STEP / costs["follow"].tick
+    yield BenchmarkResult("simulated seconds per second, physics and servo at 1 kHz, figure at 500 Hz", speed)
     yield BenchmarkResult("microseconds of a bare mj_step of the world", 1e6 * step)
     for name, cost in costs.items():
         yield BenchmarkResult(f"a closed-loop tick, {name}", cost.tick / cost.step, "mj_steps", at_most=1.5)

@@ -104,7 +104,7 @@ def _processor_time(seconds: float, recorded: bool) -> float:
             return time.process_time() - begin
 
 
-PICTURES, WARM = 200, 20  # images that are timed, and drawn before as a warm-up
+N_IMAGES, N_WARM_UP_IMAGES = 200, 20  # images that are timed, and drawn before as a warm-up
 
 
 def picture_microseconds(session: Session) -> float:
@@ -118,15 +118,15 @@ def picture_microseconds(session: Session) -> float:
         qpos = data.qpos[: model.nq] + 0.05 * rng.normal(size=(2, model.nq))
         pose, forces = qpos[:, -75:], rng.normal(size=(2, SLICE_SIDE**2, 3))
         begin = 0.0
-        for k in range(WARM + PICTURES):
-            if k == WARM:
+        for k in range(N_WARM_UP_IMAGES + N_IMAGES):
+            if k == N_WARM_UP_IMAGES:
                 begin = time.thread_time()
             moment = k % 2
             place = np.full(3, 0.01 * moment)
             with server.atomic():
                 stage.show(Moment(0.016 * k, qpos[moment], pose[moment], place, 1.0 + place, 1.0 - place, place))
                 stage.draw_slice(forces[moment], forces[moment])
-        return 1e6 * (time.thread_time() - begin) / PICTURES
+        return 1e6 * (time.thread_time() - begin) / N_IMAGES
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()

@@ -19,21 +19,21 @@ from sim.loop.loop import make_logs
 from sim.loop.servo import FrameLog, TickLog, run_block
 from sim.world.world import FigureKind
 
-STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
-SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
-SLICE = 50  # ticks that are run before they are replayed, so that both see the same load of the machine
+PHYSICS_STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
+RUN_SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
+SLICE_TICKS = 50  # ticks that are run before they are replayed, so that both see the same load of the machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
-    "follow": lambda: run_config(physics_step=STEP),
-    "follow, four clips that walk": lambda: run_config(clips=("walk",) * 4, physics_step=STEP),
-    "bunny": lambda: run_config(mode="bunny", physics_step=STEP),
-    "stretch": lambda: run_config(mode="stretch", physics_step=STEP),
-    "rivers, a clip each": lambda: run_config(mode="rivers", map="rivers", physics_step=STEP),
-    "lead": lambda: run_config(mode="lead", physics_step=STEP),
-    "composite": lambda: run_config(map="composite", clips=("walk", "angry", "cheer"), physics_step=STEP),
-    "gaze and lean": lambda: run_config(expressive=True, user="turn", physics_step=STEP),
-    "soft walls": lambda: run_config(walls=True, physics_step=STEP),
-    "a simulated person": lambda: run_config(person="median", user="trace", physics_step=STEP),
+    "follow": lambda: run_config(physics_step=PHYSICS_STEP),
+    "follow, four clips that walk": lambda: run_config(clips=("walk",) * 4, physics_step=PHYSICS_STEP),
+    "bunny": lambda: run_config(mode="bunny", physics_step=PHYSICS_STEP),
+    "stretch": lambda: run_config(mode="stretch", physics_step=PHYSICS_STEP),
+    "rivers, a clip each": lambda: run_config(mode="rivers", map="rivers", physics_step=PHYSICS_STEP),
+    "lead": lambda: run_config(mode="lead", physics_step=PHYSICS_STEP),
+    "composite": lambda: run_config(map="composite", clips=("walk", "angry", "cheer"), physics_step=PHYSICS_STEP),
+    "gaze and lean": lambda: run_config(expressive=True, user="turn", physics_step=PHYSICS_STEP),
+    "soft walls": lambda: run_config(walls=True, physics_step=PHYSICS_STEP),
+    "a simulated person": lambda: run_config(person="median", user="trace", physics_step=PHYSICS_STEP),
 }
 """All kinds of laws, maps and hands, also the expensive ones; the figure is updated every other tick, at 500 Hz."""
 
@@ -47,7 +47,7 @@ class TickCost(NamedTuple):
 
 
 def tick_cost(config: RunConfig) -> TickCost:
-    """Measure a run and the replay of its controls, in turns of `SLICE` ticks.
+    """Measure a run and the replay of its controls, in turns of `SLICE_TICKS` ticks.
 
     Every round repeats the same work, slice by slice, so the time of a slice is its minimum over the rounds: other
     processes only add to it.
@@ -55,25 +55,25 @@ def tick_cost(config: RunConfig) -> TickCost:
     closed_loop_times, bare_times, states_agree, substeps = [], [], True, 1
     for _ in range(ROUNDS):
         session, other = wire(config), wire(config)
-        ticks, frames = make_logs(session.servo, SLICE)
-        _, unused = make_logs(other.servo, SLICE)
-        begins = range(0, round(SECONDS / session.servo.plant.period), SLICE)
+        ticks, frames = make_logs(session.servo, SLICE_TICKS)
+        _, unused = make_logs(other.servo, SLICE_TICKS)
+        begins = range(0, round(RUN_SECONDS / session.servo.plant.period), SLICE_TICKS)
         times = [
-            (timed(session, k, SLICE, False, ticks, frames), timed(other, k, SLICE, True, ticks, unused))
+            (timed(session, k, SLICE_TICKS, False, ticks, frames), timed(other, k, SLICE_TICKS, True, ticks, unused))
             for k in begins
         ]
         closed_loop_times.append([time[0] for time in times])
         bare_times.append([time[1] for time in times])
         states_agree = states_agree and bool((session.world.data.qpos == other.world.data.qpos).all())
         substeps = session.servo.plant.substeps
-    tick, replayed = (float(np.min(rounds, axis=0).mean()) / SLICE for rounds in (closed_loop_times, bare_times))
+    tick, replayed = (float(np.min(rounds, axis=0).mean()) / SLICE_TICKS for rounds in (closed_loop_times, bare_times))
     return TickCost(tick, replayed / substeps, states_agree)
 
 
 def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
-    """A session that has not been run, logs for `SECONDS` of it, and the number of ticks."""
+    """A session that has not been run, logs for `RUN_SECONDS` of it, and the number of ticks."""
     session = make()
-    n = round(SECONDS / session.servo.plant.period)
+    n = round(RUN_SECONDS / session.servo.plant.period)
     return session, *make_logs(session.servo, n), n
 
 

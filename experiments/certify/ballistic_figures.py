@@ -40,7 +40,7 @@ def flown(name: str, ballistics: ClipBallistics) -> FlownClip:
 
 def rates_table(cases: Sequence[FlownClip]) -> str:
     """Measured and predicted distance of the centres of mass by clip and rate σ, as a Markdown table."""
-    lines = ["| clip | σ | can be done | strays [cm] | predicted [cm] |", "|---|---|---|---|---|"]
+    lines = ["| clip | σ | can be done | distance [cm] | predicted [cm] |", "|---|---|---|---|---|"]
     for case in cases:
         low, high = case.flight.done or (np.inf, 0.0)
         for trial in case.trials:

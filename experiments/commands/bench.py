@@ -12,12 +12,12 @@ class Command:
 
     json: Json = False
     check: bool = False
-    """Exit with 1 if a figure fails."""
+    """Exit with 1 if a result is out of its bounds."""
 
     def __call__(self) -> int:
         """Measure."""
-        from experiments.bench.benchmarks import figures
-        from experiments.bench.figures import print_figures
+        from experiments.bench.benchmarks import benchmark_results
+        from experiments.bench.results import print_results
 
         with working("measuring speed"):
-            return print_figures(figures(), self.json, self.check)
+            return print_results(benchmark_results(), self.json, self.check)

@@ -38,8 +38,8 @@ from sim.world.world import World
 
 MIN_FRAME_INTERVAL = 1.0 / 60.0  # [s] shortest time between two frames
 MAX_CPU_FRACTION = 0.5  # share of a core that drawing may take; a slower machine draws fewer frames
-POLL = 0.2  # [s] between two updates of texts and plots
-LINES = 4  # number of most recent messages that are shown
+POLL_INTERVAL = 0.2  # [s] between two updates of texts and plots
+N_MESSAGES = 4  # number of most recent messages that are shown
 
 
 class Page:
@@ -83,7 +83,7 @@ class Page:
 
     def say(self, line: str) -> None:
         """Show a line to all browsers; a line that is already shown moves to the end."""
-        self._show_messages([*(one for one in self._messages if one != line), line][-LINES:])
+        self._show_messages([*(one for one in self._messages if one != line), line][-N_MESSAGES:])
 
     def _show_messages(self, messages: list[str]) -> None:
         self._messages = messages
@@ -171,7 +171,7 @@ class Page:
                     self._set_stage()
                 self._move_by_cap()
                 self._draw()
-                if begin - last_update > POLL:
+                if begin - last_update > POLL_INTERVAL:
                     last_update = begin
                     self._update_panels()
             now = time.perf_counter()

@@ -7,25 +7,26 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from experiments.files.curve_files import CURVE_FILE, load_curve
-from experiments.paper_figures.sources import MILLIMETRES, RIVERS, STRETCH, recording_in, ticks
+from experiments.paper_figures.sources import MILLIMETRES, RIVERS, STRETCH, ticks
 from experiments.paper_figures.space import arrows, colored_path, path, workspace
 from experiments.render.film import Film, Frames
 from experiments.render.graphics import offscreen_backend
+from experiments.results.folder import RECORDING
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from sim.recording.recording import Recording, RecordingError
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.shown import courses
 
-FORCE = 30.0  # drawn length of the force in the last panel [mm]
-MOMENTS = 4
+FORCE_LENGTH = 30.0  # drawn length of the force in the last panel [mm]
+N_IMAGES = 4
 _WIDTH, _HEIGHT = 1280, 720
 
 
 def stretching(runs: Path) -> Figure:
     """Figure 6: the curve before and after the hand has stretched it, and in FOLLOW with the force on the hand."""
     folder = runs / STRETCH
-    with Recording(recording_in(folder)) as recording:
+    with Recording(folder / RECORDING) as recording:
         before = MILLIMETRES * recording.arrays["curve"]
         start = _performance_start(recording)
         end = float(recording.channel("ticks", "t")[-1])
@@ -46,7 +47,7 @@ def stretching(runs: Path) -> Figure:
     path(axes[2], after, FIELD, "", 1.0)
     path(axes[2], MILLIMETRES * performing, USER, "stylus in FOLLOW", 1.2)
     newtons = float(np.linalg.norm(force[peak_row]))
-    arrow = FORCE * force[peak_row : peak_row + 1] / newtons
+    arrow = FORCE_LENGTH * force[peak_row : peak_row + 1] / newtons
     arrows(axes[2], MILLIMETRES * performing[peak_row : peak_row + 1], arrow, "#b8433a", f"force, {newtons:.2f} N", 2.4)
     handles = {label: handle for ax in axes for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
@@ -56,11 +57,11 @@ def stretching(runs: Path) -> Figure:
 def rendered_result(runs: Path) -> Figure:
     """Figure 7: the animation of the stretched curve, rendered: the figure beside the default animation."""
     folder = runs / STRETCH
-    with Recording(recording_in(folder)) as recording:
+    with Recording(folder / RECORDING) as recording:
         start = _performance_start(recording)
         film = Film(show="both", start=start, width=_WIDTH, height=_HEIGHT)
         frames = Frames(recording, folder, film, offscreen_backend())
-        rows = np.linspace(0, len(frames) - 1, MOMENTS + 2).astype(int)[1:-1]
+        rows = np.linspace(0, len(frames) - 1, N_IMAGES + 2).astype(int)[1:-1]
         pictures = [frames.frame(int(row)) for row in rows]
         frames.close()
     figure = Figure(figsize=(9.6, 5.4), layout="constrained")
@@ -78,15 +79,15 @@ def _performance_start(recording: Recording) -> float:
     return start
 
 
-POINTS = 3000  # largest number of drawn points of a path
+MAX_POINTS = 3000  # largest number of drawn points of a path
 
 
 def crossing_rivers(runs: Path) -> Figure:
     """Figure 8: three rivers, the path of a hand in the colour of its active river, and the times of changes."""
-    with Recording(recording_in(runs / RIVERS)) as recording:
+    with Recording(runs / RIVERS / RECORDING) as recording:
         drawn, changes = courses(recording.static), river_changes(recording)
         t, p, user, river = ticks(recording, 0.0, np.inf, "p", "user", "river")
-    step = max(1, len(t) // POINTS)
+    step = max(1, len(t) // MAX_POINTS)
     t, hand, river = t[::step], MILLIMETRES * p[::step], river[::step].astype(int)
     colors = [drawn[k].line if k >= 0 else "#b9bec8" for k in river]
     figure = Figure(figsize=(7.2, 6.2), layout="constrained")
@@ -110,6 +111,6 @@ def crossing_rivers(runs: Path) -> Figure:
         for change in changes:
             panel.axvline(change.t, color=CURVE, lw=0.8, ls=":")
     height.tick_params(labelbottom=False)
-    height.set(ylabel="z [mm]", title="height of the hand, in the colour of the river that has it")
+    height.set(ylabel="z [mm]", title="height of the hand, in the colour of the active river")
     push.set(ylabel="F [N]", xlabel="time [s]", title="force of the hand")
     return figure

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.config.maps import Cylindrical
-from experiments.paper_figures.silhouettes import Paint, Silhouettes
+from experiments.paper_figures.silhouettes import Paint, Silhouettes, model_colour
 from experiments.paper_figures.sources import (
     COMPOSITE,
     CYLINDER,
@@ -15,32 +15,31 @@ from experiments.paper_figures.sources import (
     curve_of,
     poses_at,
     pushed_lap,
-    recording_in,
     ticks,
 )
 from experiments.paper_figures.space import path, workspace
-from experiments.results.folder import clips_of, config_of
+from experiments.results.folder import RECORDING, clips_of, config_of
 from geometry.arrays import Array
 from geometry.quaternions import heading
 from models.mocap.motion.clip import Clip
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, RIVERS, USER
 
-FRAMES = 9  # evenly spaced poses of the lap
-APART = 1.15  # between two frames [m]
-RED, BLUE, GREY = "#b8433a", "#2f6db3", "#c9ced6"
+N_POSES = 9  # evenly spaced poses of the lap
+POSE_SPACING = 1.15  # between two frames [m]
+RED, BLUE, PALE_BLUE, GREY = "#b8433a", "#2f6db3", "#6ea3d8", "#c9ced6"
 LEGS = ("pelvis", "thigh", "shank", "foot")
 
 
 def four_motion_cylinder(runs: Path) -> Figure:
     """Figure 3: four motions on the edges of a cylinder, the hand in FOLLOW between them, frames of the animation."""
-    with Recording(recording_in(runs / CYLINDER)) as recording:
+    with Recording(runs / CYLINDER / RECORDING) as recording:
         config, curve = config_of(recording), curve_of(recording)
         names = [clip.name for clip in clips_of(recording)]
         start, end = pushed_lap(recording)
         _, unpushed = ticks(recording, 0.0, start, "p")
         t, pushed = ticks(recording, start, end, "p")
-        times = np.linspace(t[0], t[-1], FRAMES)
+        times = np.linspace(t[0], t[-1], N_POSES)
         poses = poses_at(recording, times)
     if not isinstance(config.map, Cylindrical):
         raise TypeError("the run of Figure 3 is one of a cylindrical map")
@@ -57,7 +56,7 @@ def four_motion_cylinder(runs: Path) -> Figure:
         corners = MILLIMETRES * np.array([edges[i][k] for i in (0, 1, 3, 2, 0)])
         path(ax, corners, "#d9dde4", "", 0.7)
     path(ax, MILLIMETRES * ring, CURVE, "curve φ", 1.0, (0, (4, 3)))
-    path(ax, MILLIMETRES * unpushed, FIELD, "hand in FOLLOW, left alone", 1.4)
+    path(ax, MILLIMETRES * unpushed, FIELD, "hand in FOLLOW, not pushing", 1.4)
     path(ax, MILLIMETRES * pushed, USER, "hand in FOLLOW, pushing", 1.4)
     ax.legend(loc="upper left", bbox_to_anchor=(-0.34, 1.0))
     strip = figure.add_subplot(grid[1])
@@ -68,16 +67,16 @@ def four_motion_cylinder(runs: Path) -> Figure:
 
 def red_and_blue_inputs(runs: Path) -> Figure:
     """Figure 5: the red input moves the lower body, two blue inputs the upper; frames of the mixed animation."""
-    with Recording(recording_in(runs / COMPOSITE)) as recording:
+    with Recording(runs / COMPOSITE / RECORDING) as recording:
         clips, curve = clips_of(recording), curve_of(recording)
         start, end = pushed_lap(recording)
-        times = np.linspace(start, min(end, start + curve.duration), FRAMES)
+        times = np.linspace(start, min(end, start + curve.duration), N_POSES)
         poses = poses_at(recording, times)
     rows: list[tuple[str, Array, Paint]] = [
         (f"red input: {clips[0].name}", _lap_poses(clips[0]), _leg_paint(RED, GREY)),
         (f"blue input, inside: {clips[1].name}", _lap_poses(clips[1]), _leg_paint(GREY, BLUE)),
-        (f"blue input, outside: {clips[2].name}", _lap_poses(clips[2]), _leg_paint(GREY, "#6ea3d8")),
-        ("what the hand made of them", poses, _leg_paint(RED, BLUE)),
+        (f"blue input, outside: {clips[2].name}", _lap_poses(clips[2]), _leg_paint(GREY, PALE_BLUE)),
+        ("mixed animation", poses, _leg_paint(RED, BLUE)),
     ]
     figure = Figure(figsize=(7.2, 6.6), layout="constrained")
     for ax, (title, row, paint) in zip(figure.subplots(len(rows), 1), rows, strict=True):
@@ -95,24 +94,21 @@ def _edge(ring: Array, middle: Array, radial_offset: float, height: float) -> Ar
 
 
 def _lap_poses(clip: Clip) -> Array:
-    return clip.poses[np.linspace(0, clip.n_frames - 1, FRAMES).astype(int)]
+    return clip.poses[np.linspace(0, clip.n_frames - 1, N_POSES).astype(int)]
 
 
 def _leg_paint(legs: str, rest: str) -> Paint:
     return lambda body, _rgba: legs if body.endswith(LEGS) else rest
 
 
-def _draw_strip(ax: Axes, poses: Array, labels: list[str], paint: Paint | None = None) -> None:
+def _draw_strip(ax: Axes, poses: Array, labels: list[str], paint: Paint = model_colour) -> None:
     """Poses side by side on a floor, each seen from the same side relative to its heading, with labels below."""
     silhouettes = Silhouettes()
     for k, pose in enumerate(poses):
         azimuth = float(heading(pose[3:7])) + np.pi - 0.5
-        if paint is None:
-            silhouettes.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth)
-        else:
-            silhouettes.draw(ax, pose, (APART * k, 0.0), azimuth=azimuth, paint=paint)
+        silhouettes.draw(ax, pose, (POSE_SPACING * k, 0.0), azimuth=azimuth, paint=paint)
     for k, label in enumerate(labels):
-        ax.annotate(label, (APART * k, -0.12), ha="center", va="top", fontsize=7.5)
+        ax.annotate(label, (POSE_SPACING * k, -0.12), ha="center", va="top", fontsize=7.5)
     ax.axhline(0.0, color="#b9bec8", lw=0.6, zorder=1)
-    ax.set(aspect="equal", xlim=(-0.7, APART * (len(poses) - 1) + 0.7), ylim=(-0.35, 2.05))
+    ax.set(aspect="equal", xlim=(-0.7, POSE_SPACING * (len(poses) - 1) + 0.7), ylim=(-0.35, 2.05))
     ax.axis("off")

@@ -14,7 +14,8 @@ from experiments.files.html_page import html_page
 from experiments.paper_figures.bent_and_crossing import crossing_rivers, rendered_result, stretching
 from experiments.paper_figures.curves_and_fields import field_and_map, trajectory_and_vectors, v_plus_u
 from experiments.paper_figures.cylinder import four_motion_cylinder, red_and_blue_inputs
-from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRETCH, configs, recording_in
+from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRETCH, configs
+from experiments.results.folder import RECORDING
 from experiments.results.pages.figures import STYLE
 from experiments.runs.run import run
 from sim.errors import SimError
@@ -49,14 +50,14 @@ class Drawing(NamedTuple):
 
 DRAWINGS = (
     Drawing(1, "A trajectory and its vectors",
-            "The curve φ of FOLLOW with its tangent vectors; the way of a hand that pushes outwards and inwards, "
-            "and the force with which the field answered, as recorded.", (CYLINDER,), trajectory_and_vectors),
+            "The curve φ of FOLLOW with its tangent vectors; the recorded path of a hand that pushes outwards "
+            "and inwards, and the force of the field on it.", (CYLINDER,), trajectory_and_vectors),
     Drawing(2, "A field and the map to poses",
-            "From above: the recorded forces along the pushed hand's way within the domain of the map, and the poses "
-            "that h gives to twelve places of a lap.", (CYLINDER,), field_and_map),
+            "From above: the recorded forces along the path of the pushing hand within the domain of the map, and the "
+            "poses that h assigns to twelve points of a lap.", (CYLINDER,), field_and_map),
     Drawing(3, "Four motions on a cylinder, with FOLLOW",
             "The angle is the frame of the motion; radius and height mix four motions, one on each edge. A hand that "
-            "is led, and then pushes; frames of the animation that came of it.", (CYLINDER,), four_motion_cylinder),
+            "is led, and then pushes; frames of the resulting animation.", (CYLINDER,), four_motion_cylinder),
     Drawing(4, "V + U",
             "A river V, the performance φ' that left it, and U, what the performance added to V. Integrated again, "
             "V + U gives the performance.", (CYLINDER,), v_plus_u),
@@ -70,7 +71,7 @@ DRAWINGS = (
             "The bent curve performed by the physical figure, with the animation of the curve before it was bent "
             "beside it.", (STRETCH,), rendered_result),
     Drawing(8, "Crossing rivers",
-            "Three rivers with a motion each; a hand that pushes at a crossing goes over into another one, and the "
+            "Three rivers with a motion each; a hand that pushes at a crossing changes to another one, and the "
             "figure with it.", (RIVERS,), crossing_rivers),
 )  # fmt: skip
 
@@ -128,7 +129,7 @@ def draw_one(drawing: Drawing, runs: Path, out: Path) -> Path:
 
 
 def _has_recording(folder: Path) -> bool:
-    file = recording_in(folder)
+    file = folder / RECORDING
     if not file.exists():
         return False
     with Recording(file) as recording:

@@ -13,8 +13,14 @@ from models.humanoid.skeleton import figure_model
 from models.world.scene import FIRST_HIDDEN_GROUP
 
 Paint = Callable[[str, Array], str | tuple[float, ...]]
+"""Colour of a geom, from the name of its body and its colour in the model (4,)."""
 
 _N_CORNERS = 28  # of an outline
+
+
+def model_colour(body: str, rgba: Array) -> tuple[float, ...]:
+    """The geom's own colour."""
+    return tuple(rgba)
 
 
 class Outline(NamedTuple):
@@ -62,7 +68,7 @@ class Silhouettes:
 
     def draw(
         self, ax: Axes, pose: Array, at: tuple[float, float], scale: float = 1.0, azimuth: float = 0.0,
-        paint: Paint = lambda body, rgba: tuple(rgba),
+        paint: Paint = model_colour,
     ) -> None:  # fmt: skip
         """Draw a pose with its root above a point of the axes, with `scale` units of the axes per metre."""
         for outline in self.outlines(pose, azimuth):

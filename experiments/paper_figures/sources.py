@@ -1,7 +1,5 @@
 """The runs from which the paper's figures are drawn, and access to their recordings."""
 
-from pathlib import Path
-
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
@@ -55,10 +53,3 @@ def poses_at(recording: Recording, times: Array) -> Array:
     rows = np.clip(np.searchsorted(t, times), 0, len(t) - 1)
     channel = recording.channel("frames", "reference")
     return np.array([channel[int(row)] for row in rows])
-
-
-def recording_in(folder: Path) -> Path:
-    """The recording in a folder of a run."""
-    from experiments.results.folder import RECORDING
-
-    return folder / RECORDING

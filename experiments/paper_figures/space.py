@@ -13,7 +13,7 @@ from geometry.arrays import Array
 _AZIMUTH = -60.0  # of the viewer [degrees]
 
 
-def workspace(figure: Figure, place: Any, points: Array, elevation: float = 26.0, zoom: float = 1.0) -> Axes3D:
+def workspace(figure: Figure, place: Any, points: Array, elevation: float, zoom: float = 1.0) -> Axes3D:
     """3D axes of the hand frame H [mm] around points (n, 3) [mm], with equal scale."""
     ax: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)

@@ -75,7 +75,7 @@ GHOST_DEPTH = 0.35  # and away from the camera [m]
 FRAME_SCALE = 1.1  # size of the picture relative to its required contents
 ARM_REACH = 0.45  # smallest visible distance to either side of a root [m]
 LEGEND = 0.1  # room for the legend at the bottom [m]
-ARROW = 0.06  # drawn length of a large force [m]
+ARROW_LENGTH = 0.06  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.6  # [s] of the stylus's path that are drawn behind it
 MIN_ARROW_LENGTH = 0.004  # shortest arrow that is drawn [m]
 
@@ -97,7 +97,7 @@ class Workspace:
         self._p_WH, self._p = recording.arrays["p_WH"], recording.channel("ticks", "p")
         self._forces = {name: recording.channel("ticks", name) for name in ("force", "user")}
         peak = max(*(typical_peak(channel) for channel in self._forces.values()), 1e-9)
-        self.metres_per_newton = ARROW / peak
+        self.metres_per_newton = ARROW_LENGTH / peak
         self._trail = round(TRAIL_SECONDS * recording.rates["ticks"])
         curve = self._p_WH + recording.arrays["curve"]
         middle = 0.5 * (curve.min(axis=0) + curve.max(axis=0))

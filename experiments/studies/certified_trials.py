@@ -20,12 +20,12 @@ from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, 
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
 
-FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
+MAX_INITIAL_FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
 LAP_SECONDS = 4.0  # duration of a lap of the rivers; hands are released with the curve standing still
-REMAINING = 0.2  # remaining share of the slowest mode at the end of a simulation, unless that takes too long
-LONGEST = 2000  # [ticks] longest simulation
-COUNTS = 5e-5  # [m] by which readings of a hand at rest change: one or two encoder counts
-ASSUMED = Conditions(16)
+FINAL_MODE_FRACTION = 0.2  # remaining share of the slowest mode at the end of a simulation, unless that takes too long
+MAX_TICKS = 2000  # [ticks] longest simulation
+REST_READING_CHANGE = 5e-5  # [m] by which readings of a hand at rest change: one or two encoder counts
+ASSUMED_CONDITIONS = Conditions(16)
 
 
 class Certified(NamedTuple):
@@ -86,8 +86,8 @@ def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) 
     while True:
         offset, velocity = rng.normal(size=3), rng.normal(size=3)
         mix = rng.uniform(0.0, 0.5 * np.pi)
-        offset *= min(2e-3, FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
-        velocity *= min(0.1, FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
+        offset *= min(2e-3, MAX_INITIAL_FORCE * np.cos(mix) / river.k_r) / np.linalg.norm(offset)
+        velocity *= min(0.1, MAX_INITIAL_FORCE * np.sin(mix) / river.b_d) / np.linalg.norm(velocity)
         try:
             theta = np.array(device.angles(drawn.still.point(phase) + offset)) - loop.linear.theta[0]
         except SimError:  # beyond a joint stop of the Phantom: draw another state
@@ -96,12 +96,13 @@ def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) 
     rate = np.linalg.solve(loop.linear.jacobian[0], velocity)
     torques = np.tile(loop.linear.weight_theta[0] @ theta, clock.whole_delay)
     state = np.concatenate([theta, rate, theta - clock.period * rate, rate, torques])
-    ticks = int(np.clip(np.log(REMAINING) / np.log(drawn.radius), 200, LONGEST)) if drawn.radius < 1.0 else LONGEST
+    decay = np.log(FINAL_MODE_FRACTION) / np.log(drawn.radius) if drawn.radius < 1.0 else np.inf
+    ticks = int(np.clip(decay, 200, MAX_TICKS))
     path = hand_path(trial, river.k_r, ticks, conditions, state)
     if len(path) < ticks:
         return Release(np.inf, np.inf, 0.0)
     distance = closest_phases(drawn.still.packed(), path)[1]
-    slack = COUNTS if conditions.rounded else 0.0
+    slack = REST_READING_CHANGE if conditions.rounded else 0.0
     return Release(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
 
 
@@ -125,12 +126,9 @@ def certified_trials(
     for number in range(rivers):
         drawn = draw_certified(rng)
         clocks.append(drawn.river.sampling.period)
-        for releases, conditions in zip(found.values(), (ASSUMED, FULL_CONDITIONS), strict=True):
+        for releases, conditions in zip(found.values(), (ASSUMED_CONDITIONS, FULL_CONDITIONS), strict=True):
             releases += [release(drawn, conditions, rng) for _ in range(hands)]
-        print(
-            f"{number + 1}/{rivers}: {sum(r.diverges for releases in found.values() for r in releases)}",
-            flush=True,
-        )
+        print(f"{number + 1}/{rivers}: {sum(r.diverges for releases in found.values() for r in releases)}", flush=True)
     lines = [
         f"{rivers} certified rivers, periods of {1e3 * min(clocks):.2f} to {1e3 * max(clocks):.2f} ms (seed {seed})",
         "",

@@ -49,13 +49,13 @@ Form = Literal["discrete", "smooth"]
 ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)  # between two rivers [degrees]
 PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)  # [N]
 PUSH_SECONDS = 0.2  # [s]
-SECONDS = 1.25  # [s] from 45 mm before the crossing to 45 mm behind it
+PASSAGE_SECONDS = 1.25  # [s] from 45 mm before the crossing to 45 mm behind it
 CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
 
 GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]
-HARDER = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
-BEFORE = (-0.1, 0.0, 0.1)  # [s] by which a push begins before the crossing
-LASTING = (0.2, 0.4)  # [s] duration of a push
+RIVER_PUSHES = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
+PUSH_LEADS = (-0.1, 0.0, 0.1)  # [s] by which a push begins before the crossing
+PUSH_DURATIONS = (0.2, 0.4)  # [s] duration of a push
 
 
 class Passage(NamedTuple):
@@ -146,13 +146,13 @@ def crossing_field(second: River, form: Form, alone: bool) -> Program:
 def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
     """Passage through the origin along x, with a push in the plane across the first river, towards the second."""
     pushes = (Push(0.0, PUSH_SECONDS, newtons, (0.0, 1.0, 0.0), (-0.0075, 0.0, 0.0), 0.004),) if newtons else ()
-    return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), SECONDS, pushes)
+    return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), PASSAGE_SECONDS, pushes)
 
 
-def verdict(way: Passage) -> str:
+def outcome(found: Passage) -> str:
     """Which river had the hand at the end, and for how long none had it, if that was 20 ms or more."""
-    lost = float(np.sum(way.river < 0.0)) * 1e-3
-    end = "out" if way.river[-1] < 0.0 else f"{int(way.river[-1]) + 1}"
+    lost = float(np.sum(found.river < 0.0)) * 1e-3
+    end = "out" if found.river[-1] < 0.0 else f"{int(found.river[-1]) + 1}"
     return end if lost < 0.02 else f"{end} ({lost:.2f} s)"
 
 
@@ -163,9 +163,9 @@ def crossing_passages() -> str:
     for degrees in ANGLES:
         for form in ("discrete", "smooth"):
             passages = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
-            unpaired = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
-            away = 1e3 * float(np.max(np.abs(passages[0].p - unpaired.p)))
-            cells = " | ".join(verdict(one) for one in passages)
+            alone = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
+            away = 1e3 * float(np.max(np.abs(passages[0].p - alone.p)))
+            cells = " | ".join(outcome(one) for one in passages)
             lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
     return "\n".join(lines)
 
@@ -177,7 +177,7 @@ def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
     """
     curve = Trajectory.circle(Circle().radius, Circle().lap)
     program, changed, out = law_of(mode, default_choice(mode, curve, Cylindrical().reach)).program(), 0, 0
-    pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in BEFORE for lasts in LASTING]
+    pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in PUSH_LEADS for lasts in PUSH_DURATIONS]
     for up, lead, lasts in pushes:
         at = curve.start + (0.5 if up > 0.0 else 0.75) * curve.duration - lead
         x, y, z = (float(value) for value in curve.point(at))
@@ -190,10 +190,11 @@ def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
 
 def pushed_rivers() -> str:
     """The table as Markdown: by gains and push, how many hands change over, and how many are thrown out."""
-    lines = ["| k_r, b_d | " + " | ".join(f"{f:g} N" for f in HARDER) + " |", "|---|" + "--:|" * len(HARDER)]
+    lines = ["| k_r, b_d | " + " | ".join(f"{force:g} N" for force in RIVER_PUSHES) + " |"]
+    lines.append("|---|" + "--:|" * len(RIVER_PUSHES))
     for stiffness, damping in GAINS:
         mode = Rivers(stiffness=stiffness, damping=damping)
-        cells = [changed_over(mode, f) for f in HARDER]
+        cells = [changed_over(mode, f) for f in RIVER_PUSHES]
         row = " | ".join(f"{changed}, {out}" for changed, out, _ in cells)
         lines.append(f"| {stiffness:g}, {damping:g} | {row} |")
     return "\n".join(lines)

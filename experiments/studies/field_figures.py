@@ -28,7 +28,7 @@ from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
 SPEED = 0.075  # of the rivers in the table and of the default curve [m/s]
 DRAG = 4.0  # [N s/m]
-STEP = 15  # between the angles of the table [degrees]
+ANGLE_STEP = 15  # between the angles of the table [degrees]
 
 
 class Crossing(NamedTuple):
@@ -95,11 +95,11 @@ def _felt_forces(field: Law, places: Array) -> Array:
 def crossing_table() -> str:
     """The table of crossings as Markdown."""
     lines = [
-        "| angle | static sum | smooth | discrete | discrete, river 1 away | sum, passing | smooth, passing "
+        "| angle | static sum | smooth | discrete | discrete, river 2 alone | sum, passing | smooth, passing "
         "| discrete, passing |",
         "|--:|--:|--:|--:|--:|--:|--:|--:|",
     ]
-    for degrees in range(0, 181, STEP):
+    for degrees in range(0, 181, ANGLE_STEP):
         row = crossing(float(degrees))
         cells = (_force_text(force) for force in row[1:])
         lines.append(f"| {degrees}° | " + " | ".join(cells) + " |")
@@ -117,12 +117,12 @@ def crossing_figure() -> Figure:
     angles = [row.angle for row in rows]
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     crossing_ax, passing_ax = figure.subplots(1, 2, sharey=True)
-    crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 1 away")
+    crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 2 alone")
     columns = (("static sum", TUBE), ("smooth", FIELD), ("discrete", CURVE))
     for (name, colour), here, way in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
         crossing_ax.plot(angles, [row[here] for row in rows], color=colour, label=name)
         passing_ax.plot(angles, [row[way] for row in rows], color=colour)
-    for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "greatest on the way through")):
+    for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "largest while passing")):
         ax.set(xlabel="angle between the rivers [°]", xticks=range(0, 181, 30), title=title)
     crossing_ax.set(ylabel="force of river 2 [N]")
     crossing_ax.legend()
@@ -181,7 +181,7 @@ def edited_figure() -> Figure:
     return figure
 
 
-def eight() -> Trajectory:
+def figure_of_eight() -> Trajectory:
     """A river that crosses itself: a figure of eight, 0.12 m by 0.06 m."""
     angle = np.linspace(0.0, 2.0 * np.pi, 129)
     points = np.stack((0.06 * np.sin(angle), 0.03 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
@@ -192,11 +192,11 @@ def eight() -> Trajectory:
 def main(folder: Path) -> None:
     """Draw all pictures into a folder and print the table."""
     circle, small = Trajectory.circle(0.05, 4.0), Trajectory.circle(0.05, 4.0, (0.0, 0.02, 0.0))
-    bundle = RiverBundle((River(eight()), River(small)), ("eight", "ring"))
+    bundle = RiverBundle((River(figure_of_eight()), River(small)), ("eight", "ring"))
     pictures = {
         "follow": lambda: force_figure(Follow(circle, 300.0, 4.0, 0.03), [circle], 0.03, 0.0),
         "bunny": lambda: force_figure(Bunny(circle, 300.0, 4.0, 0.02, "point", "clock"), [circle], 0.0, 0.5),
-        "rivers": lambda: force_figure(bundle, [eight(), small], 0.02, 0.0),
+        "rivers": lambda: force_figure(bundle, [figure_of_eight(), small], 0.02, 0.0),
         "crossing": crossing_figure,
         "edited": edited_figure,
     }

@@ -6,7 +6,7 @@ the docs.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +30,8 @@ from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.hand.arm import Arm
 
-SCALE, UPRIGHT, RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω of all trials, with which the walker's motion is negligible
-EXCESS = 1e-4  # [m] distance of the stylus from the edge, on the side where the spring acts
+SCALE, STIFFNESS_RATIO, WALKER_RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω [1/s]: the walker's motion is negligible
+EDGE_DISTANCE = 1e-4  # [m] distance of the stylus from the edge, on the side where the spring acts
 _SOFT_STIFFNESS = 1e-4  # [N/m] stiffness of an arm so soft, with a target so far away, that its force is constant
 _GAIT = Gait(1.4, 1.25, np.array([2, 2]), 0.45)
 
@@ -50,7 +50,7 @@ class LeadingTrial(Trial):
 
     def loop(self) -> SampledLoop:
         """The linearised loop at the trial's place."""
-        law = self.regime.law(SCALE, UPRIGHT)
+        law = self.regime.law(SCALE, STIFFNESS_RATIO)
         return SampledLoop(
             linearise(phantom_device(), law, self.curve, np.array([self.phase]), self.hand), self.sampling
         )
@@ -68,10 +68,10 @@ class LeadingTrial(Trial):
     def field(self, k_l: float) -> Leading:
         """The executed law, with the figure placed such that the trial's position lies in the regime."""
         c, s = (float(x) for x in self.regime.tangent(self.curve.velocity(self.phase)))
-        plain = Walking(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=RATE)
+        plain = Walking(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=WALKER_RATE)
         lead = plain.lead[0]
         laid = (plain.path()[0] - 1.0) * STEP - plain.ahead
-        edge = SCALE * EXCESS
+        edge = SCALE * EDGE_DISTANCE
         if not self.regime.beyond:
             along = -plain.backward * lead - edge if self.regime.ahead else -edge
             bend, across = plain.curvature, edge if self.regime.aside and self.regime.ahead else 0.0
@@ -82,8 +82,8 @@ class LeadingTrial(Trial):
             side = np.sign(self.regime.turn) if self.regime.turn else 1.0
             across = side * (0.5 * bend * beyond**2 + edge) if self.regime.aside else 0.0
         x, y = SCALE * self.curve.point(self.phase)[:2] - (along * c - across * s, along * s + across * c)
-        walking = Walking(_GAIT, (x / SCALE, y / SCALE), plain.heading, SCALE, rate=RATE, pull=1e-3, curvature=bend)
-        return Leading(walking, k_l=k_l, k_z=UPRIGHT * k_l, b=self.b_d)
+        walking = replace(plain, start=(x / SCALE, y / SCALE), pull=1e-3, curvature=bend)
+        return Leading(walking, k_l=k_l, k_z=STIFFNESS_RATIO * k_l, b=self.b_d)
 
 
 def leading_trial(

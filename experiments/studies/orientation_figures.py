@@ -33,7 +33,7 @@ CONFIG = run_config(
     clips=("cheer",), expressive=True, user="turn", seconds=16.0, orientation_stiffness=0.05, orientation_damping=5e-4
 )
 BASE_COLOUR, PHYSICAL_COLOUR = "#a8adb8", "#23272f"
-SIZE = (300, 420)  # of one picture of the figure [pixels]
+IMAGE_SIZE = (300, 420)  # of one picture of the figure [pixels]
 DISTANCE, AZIMUTH, ELEVATION = 3.0, 205.0, -8.0  # camera in front of the figure [m], [deg], [deg]
 
 
@@ -77,14 +77,14 @@ def turning_figure(recording: Recording) -> Figure:
     for i, name in enumerate(("roll", "pitch", "yaw")):
         axes[0].plot(t[::8], np.degrees(turn[:, i]), color=AXES[i], label=name)
         axes[4].plot(t, 1e3 * moment[:, i], color=AXES[i], label=f"about {'xyz'[i]}")
-    titles = ("gaze to the left [°]", "gaze down [°]", "trunk over to the right [°]")
+    titles = ("gaze to the left [°]", "gaze down [°]", "lean to the right [°]")
     for ax, title, k, colour in zip(axes[1:4], titles, range(3), (AXES[2], AXES[1], AXES[0]), strict=True):
         ax.plot(frames, np.degrees(base[k]), color=BASE_COLOUR, label="animation, stylus upright")
         ax.plot(frames, np.degrees(animation[k]), color=colour, label="animation")
         ax.plot(frames, np.degrees(physical[k]), color=PHYSICAL_COLOUR, ls=":", label="physical figure")
         ax.set(title=title)
     axes[0].set(title="turn of the stylus, measured [°]")
-    axes[4].set(title="moment of the field, recorded and not given [mN m]", xlabel="time [s]")
+    axes[4].set(title="moment of the field, recorded but not exerted [mN m]", xlabel="time [s]")
     for ax in axes:
         # In the row of the title, where it covers no curve.
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3)
@@ -101,7 +101,7 @@ def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
     qpos, rate = recording.channel("frames", "qpos"), recording.rates["frames"]
     camera, pictures = mujoco.MjvCamera(), list[npt.NDArray[np.uint8]]()
     camera.distance, camera.elevation = DISTANCE, ELEVATION
-    with mujoco.Renderer(model, SIZE[1], SIZE[0]) as renderer:
+    with mujoco.Renderer(model, IMAGE_SIZE[1], IMAGE_SIZE[0]) as renderer:
         for moment in moments:
             data.qpos[:] = qpos[min(round(moment * rate), len(qpos) - 1)]
             mujoco.mj_forward(model, data)

@@ -19,11 +19,10 @@ from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.prepare import Prepared, prepared
 from models.mocap.preparation.well_formed import WellFormed, well_formed
 
-SECONDS = 20.0  # [s] for which the figure follows each clip
-HEAD = (
-    "| file | half | part, pace | residual before % | after % | if not: | motion lacks % | segments from the file ° "
-    "| joints from the file cm | soles in stance mm | tilt ° | skate mm | stand out | ends rad/s "
-    "| flights: m/s² beside gravity (number) | joints beyond ° | torques % of limits "
+TABLE_HEADER = (
+    "| file | half | part, pace | residual before % | after % | fault of | residual of the motion % "
+    "| segments from the file ° | joints from the file cm | soles in stance mm | tilt ° | skate mm | outliers "
+    "| ends rad/s | flights: m/s² beside gravity (number) | joints beyond ° | torques % of limits "
     "| joints, root from the capture, RMS | most | processor time: s, times the clip, times simulating |\n"
     "|" + 20 * "---|"
 )
@@ -32,7 +31,7 @@ HEAD = (
 def row(path: Path, made: Prepared) -> str:
     """A line of the table."""
     was, now = (well_formed(clip, clip_flights(clip)) for clip in (made.captured, made.clip))
-    before, after = followed(made.captured, SECONDS), followed(made.clip, SECONDS)
+    before, after = followed(made.captured), followed(made.clip)
     change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
     most, directions, places = kept.extremes[0], *_source_deviations(path, made)
     motion_is_near = made.near and change.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
@@ -93,8 +92,8 @@ def _soles_text(measures: WellFormed) -> str:
 
 def main(paths: list[str]) -> None:
     """Print the table."""
-    print(HEAD)
-    followed(embedded("walk"), SECONDS)  # compiles the units first, so that no clip's time includes that
+    print(TABLE_HEADER)
+    followed(embedded("walk"))  # compiles the units first, so that no clip's time includes that
     for path in map(Path, paths):
         try:
             print(row(path, prepared(path)), flush=True)

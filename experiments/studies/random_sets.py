@@ -11,6 +11,7 @@ import json
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -51,9 +52,9 @@ JUDGING = (
 )  # fmt: skip
 """The two halves of the captures of `docs/validation/prepared-captures.md`, without one that is a copy."""
 
-SECONDS = 20.0  # [s] of a run
+RUN_SECONDS = 20.0  # [s] of a run
 MAX_SOLO_RESIDUAL = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
-LONGEST_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
+MAX_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
 _STRIDE = 5  # every fifth frame of the animation is measured: 100 a second
 
 
@@ -80,18 +81,15 @@ class Captured(NamedTuple):
 def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
     """Prepare a file and follow it alone."""
     try:
-        clip = _with_name(prepared_clips([Path(folder) / name])[0].clip, name)
+        clip = replace(prepared_clips([Path(folder) / name])[0].clip, name=name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
     residual, fell, *_ = followed(clip)
     reason = "; ".join(not_blendable((clip, _rest_clip(clip))))
     if not reason and (fell is not None or residual > MAX_SOLO_RESIDUAL):
-        reason = "alone " + (f"falls at {fell:.1f} s" if fell is not None else f"lacks {100 * residual:.0f} %")
+        fault = f"has a residual of {100 * residual:.0f} %" if fell is None else f"falls at {fell:.1f} s"
+        reason = f"alone {fault}"
     return Captured(name, reason, residual, fell), clip
-
-
-def _with_name(clip: Clip, name: str) -> Clip:
-    return Clip(clip.poses, clip.fps, name)
 
 
 def _rest_clip(clip: Clip) -> Clip:
@@ -118,13 +116,13 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         else:
             lap = natural_lap(with_loop_first(timing, loops))
             if kind == "rivers":
-                lap /= np.ceil(lap / LONGEST_LAP)
+                lap /= np.ceil(lap / MAX_LAP)
             words = dict[str, Any](map=kind, clips=names, lap=lap)
-        config = run_config(mode=mode, user=user, seconds=SECONDS, seed=seed, **words)
+        config = run_config(mode=mode, user=user, seconds=RUN_SECONDS, seed=seed, **words)
         session = wire(config, tuple(clips))
     played, laps = getattr(session.haptic_map, "loops", loops), getattr(session.haptic_map, "laps", 1)
     log = TrialLog(session.servo, session.world)
-    Loop(session.servo, session.world, log).run(SECONDS)
+    Loop(session.servo, session.world, log).run(RUN_SECONDS)
     frames, weight = log.frames, session.weight
     fallen = np.flatnonzero(frames["down"] != UP)
     fell = float(frames["t"][fallen[0]]) if len(fallen) else None
@@ -170,7 +168,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     lines = [
         "| map | sets, of which told off their pace before | stand (95 % interval) | residual of those %: median, "
         "largest; within 12 | lowest sole cm; above -1 | skate cm: median, most; within 2 | joints beyond °; within "
-        "| time in which a river has the hand %: least |",
+        "| time in which a river is active %: least |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for kind in dict.fromkeys(row["map"] for row in rows):

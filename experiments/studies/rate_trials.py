@@ -38,9 +38,9 @@ from sim.world.phantom_port import sense_in_motion
 
 DRAG, TUBE = 8.0, 0.015  # drag of governor and river [N s/m], radius of the tube [m]
 SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]
-REACH = 0.03  # [m] length of a straight path before and behind its point of contact: within tube and flight
+HALF_LENGTH = 0.03  # [m] length of a straight path before and behind its point of contact: within tube and flight
 STEP = 0.005  # [s] between the points of a path
-RUN_UP, SLOWING = 0.4, 0.6  # [s] before the flight, and the share of the flight in which a hand slows down
+APPROACH_TIME, SLOWING_FRACTION = 0.4, 0.6  # [s] before the flight; share of the flight in which a hand slows down
 
 
 class Passage(NamedTuple):
@@ -64,7 +64,7 @@ class Passage(NamedTuple):
     river: Array
 
 
-class Bench:
+class LedBackflip:
     """The backflip on a circle of the hand: its curve, its admissible speeds, and a hand that is led along it.
 
     Attributes
@@ -101,33 +101,33 @@ class Bench:
         bundle = RiverBundle((River(self.curve, TUBE, speeds=self.speeds),), ("backflip",))
         return HigherOrder(bundle, GATE * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace, "discrete").program()
 
-    def past(self, speed: float) -> Array:
+    def straight_path(self, speed: float) -> Array:
         """A straight path at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""
         middle = 0.5 * sum(self.flight)
         there, along = self.curve.point(middle), self.curve.velocity(middle)
-        steps = np.arange(-REACH, REACH, speed * STEP)
+        steps = np.arange(-HALF_LENGTH, HALF_LENGTH, speed * STEP)
         return there + np.outer(steps, along / np.linalg.norm(along))
 
-    def slowing(self, speed: float) -> Array:
+    def slowing_path(self, speed: float) -> Array:
         """A path along the curve at its own pace that slows down to a speed [m/s] in mid-flight, shape (n, 3) [m]."""
         first, last = self.flight
         pace = self.curve.length / self.curve.duration
-        phase, phases = first - RUN_UP, [first - RUN_UP]
+        phase, phases = first - APPROACH_TIME, [first - APPROACH_TIME]
         while phase < last:
-            slow = float(smooth_step((phase - first) / (last - first) / SLOWING))
+            slow = float(smooth_step((phase - first) / (last - first) / SLOWING_FRACTION))
             phase += STEP * (1.0 + slow * (speed / pace - 1.0))
             phases.append(phase)
         return self.curve.point(np.array(phases))
 
-    def led(self, program: Program, way: Array) -> Passage:
+    def passage(self, program: Program, path: Array) -> Passage:
         """Lead a hand along a path, in steps of `STEP`, in a field."""
         session = self._session()
-        session.world.reset(way[0], rest_pose())
+        session.world.reset(path[0], rest_pose())
         field = session.servo.field.of(program)
         phantom = session.servo.device
         assert isinstance(phantom, SimulatedPhantom)
         sense_in_motion(phantom.port)  # at zero velocity, as the path begins at rest
-        device = phantom.held_by(Arm(400.0, 10.0, way, STEP))
+        device = phantom.held_by(Arm(400.0, 10.0, path, STEP))
         servo = session.servo._replace(field=field, device=device)
         blocks: list[tuple[Array, ...]] = []
 
@@ -139,44 +139,44 @@ class Bench:
             columns = (hand[:, 0], trace[:, TRACE_PHASE], trace[:, TRACE_DISTANCE], speed, force, trace[:, TRACE_RIVER])
             blocks.append(tuple(column.copy() for column in columns))
 
-        Loop(servo, session.world, keep).run(STEP * (len(way) - 1))
+        Loop(servo, session.world, keep).run(STEP * (len(path) - 1))
         return Passage(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
 
-    def felt(self, speed: float) -> tuple[float, float]:
+    def force_at(self, speed: float) -> tuple[float, float]:
         """Speed [m/s] of a hand where it touches the curve in mid-flight, and the governor's force on it there [N]."""
-        passage = self.led(self.governor(), self.past(speed))
+        passage = self.passage(self.governor(), self.straight_path(speed))
         near = passage.distance < 1e-3
         return float(passage.speed[near].mean()), float(passage.along[near].mean())
 
-    def taken(self, speed: float) -> tuple[float, float]:
+    def taken_at(self, speed: float) -> tuple[float, float]:
         """Mean speed [m/s] of a hand in the tube of the backflip's river, and the share of time it is taken."""
-        passage = self.led(self.gate(), self.past(speed))
+        passage = self.passage(self.gate(), self.straight_path(speed))
         inside = passage.distance < 0.9 * TUBE
         return float(passage.speed[inside].mean()), float(np.mean(passage.river[inside] == 0.0))
 
 
-def draw(bench: Bench) -> Figure:
+def draw(trial: LedBackflip) -> Figure:
     """Force and gate over the speed in mid-flight, and the force on a hand that slows down there."""
     figure = Figure(figsize=(9.6, 3.0), layout="constrained")
     force_ax, gate_ax, slow_ax = figure.subplots(1, 3)
-    middle = len(bench.speeds) * 0.5 * sum(bench.flight) / bench.curve.duration
-    least, greatest = bench.speeds[int(middle)]
-    forces = np.array([bench.felt(speed) for speed in SPEEDS])
+    middle = len(trial.speeds) * 0.5 * sum(trial.flight) / trial.curve.duration
+    least, greatest = trial.speeds[int(middle)]
+    forces = np.array([trial.force_at(speed) for speed in SPEEDS])
     law = np.linspace(0.0, 0.2, 201)
     force_ax.plot(1e3 * law, [governor_force(s, least, greatest, DRAG) for s in law], color=TUBE_COLOUR, label="law")
     force_ax.plot(1e3 * forces[:, 0], forces[:, 1], "o", ms=4, color=FIELD, label="on the Phantom")
     force_ax.set(ylabel="governor's force along the curve [N]")
     force_ax.legend()
-    taken = np.array([bench.taken(speed) for speed in SPEEDS])
+    taken = np.array([trial.taken_at(speed) for speed in SPEEDS])
     gate_ax.plot(1e3 * taken[:, 0], 100 * taken[:, 1], "o", ms=4, color=FIELD)
     gate_ax.set(ylabel="taken by the river [% of time in tube]")
     for ax in (force_ax, gate_ax):
         ax.axvspan(1e3 * least, 1e3 * greatest, color="#e4f1e6", lw=0)
         ax.set(xlabel="speed in mid-flight [mm/s]")
-    passage = bench.led(bench.governor(), bench.slowing(0.05))
+    passage = trial.passage(trial.governor(), trial.slowing_path(0.05))
     slow_ax.plot(passage.t, 1e3 * passage.speed, color=USER, label="speed [mm/s]")
-    shares = np.linspace(bench.curve.start, bench.curve.end, len(bench.speeds))
-    slowest = np.interp(passage.phase, shares, bench.speeds[:, 0])
+    shares = np.linspace(trial.curve.start, trial.curve.end, len(trial.speeds))
+    slowest = np.interp(passage.phase, shares, trial.speeds[:, 0])
     slow_ax.plot(passage.t, 1e3 * slowest, color=CURVE, label="least speed [mm/s]")
     slow_ax.plot(passage.t, 100 * passage.along, color=FIELD, label="force [0.01 N]")
     slow_ax.set(xlabel="time [s]", title="a hand that slows down in flight", ylim=(-10.0, 205.0))
@@ -187,7 +187,7 @@ def draw(bench: Bench) -> Figure:
 def main(folder: Path) -> None:
     """Draw the picture of the docs into a folder."""
     with mpl.rc_context(STYLE):
-        draw(Bench()).savefig(folder / "governor.png", dpi=130)
+        draw(LedBackflip()).savefig(folder / "governor.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -41,12 +41,10 @@ def certified_region() -> tuple[River, Verdict]:
     return river, region(river, HANDS, ForceLimiter(river.sampling.period).peak, Verdict("certified", "not asked"))
 
 
-def simulate_from(
-    river: River, figures: Mapping[str, object], hands: HandRange, times: float, rng: np.random.Generator
-) -> Outcome:
-    """Simulate from a random state at which √V is `times` its value at the region's edge."""
+def simulate_from(river: River, figures: Mapping[str, object], times: float, rng: np.random.Generator) -> Outcome:
+    """Simulate a hand of `HANDS` from a random state at which √V is `times` its value at the region's edge."""
     curve, device = river.curve, river.device
-    hand = HandImpedance(*(float(rng.uniform(*getattr(hands, name))) for name in ("mass", "damping", "stiffness")))
+    hand = HandImpedance(*(float(rng.uniform(*getattr(HANDS, name))) for name in ("mass", "damping", "stiffness")))
     phase = float(rng.uniform(curve.start, curve.end))
     tangent = curve.velocity(phase)
     away = rng.normal(size=3)
@@ -110,7 +108,7 @@ def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, out
     figures = verdict.figures
     most, ball = float(str(figures["largest_distance"])), float(str(figures["ball"]))
     for times, n in ((1.0, count), (1.5, outside), (3.0, outside), (6.0, outside)):
-        outcomes = np.array([simulate_from(river, figures, HANDS, times, rng) for _ in range(n)])
+        outcomes = np.array([simulate_from(river, figures, times, rng) for _ in range(n)])
         left, astray = int(np.sum(outcomes[:, 0] > times * most)), int(np.sum(outcomes[:, 1] > ball))
         lines.append(f"| {times:g} | {n} | {left} | {astray} | {1e3 * outcomes[:, 0].max():.2f} |")
         print(lines[-1], flush=True)

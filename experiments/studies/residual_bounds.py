@@ -28,7 +28,7 @@ from sim.loop.loop import Loop
 BOUNDS = ((1.0, 0.2), (0.5, 0.1), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01))
 """Bounds of the force as a share of body weight, and of the moment as a share of body weight × stature."""
 
-SECONDS, NUDGES = 8.0, (0.0, 1e-6, -1e-6)
+CLIP_SECONDS, PERTURBATIONS = 8.0, (0.0, 1e-6, -1e-6)
 RUNS: Mapping[str, tuple[float, Mapping[str, Any]]] = {
     "FOLLOW, pushed": (20.0, {"user": "push"}),
     "rivers, a clip each": (10.0, {"mode": "rivers", "map": "rivers"}),
@@ -44,18 +44,18 @@ RUNS: Mapping[str, tuple[float, Mapping[str, Any]]] = {
 """Duration [s] and words of each run, by its name in the table."""
 
 
-def cell(clip: Clip, force: float, moment: float, seconds: float = SECONDS) -> str:
+def cell(clip: Clip, force: float, moment: float, seconds: float = CLIP_SECONDS) -> str:
     """Number of falls out of all runs, and median residual of the runs that stand [% of body weight]."""
     config = TrackingConfig(gains=FigureGains(force_bound=force, moment_bound=moment))
-    reports = [track(Clip(clip.poses, clip.fps * (1.0 + nudge), clip.name), seconds, config) for nudge in NUDGES]
+    reports = [track(Clip(clip.poses, clip.fps * (1.0 + nudge), clip.name), seconds, config) for nudge in PERTURBATIONS]
     fell, residual = sum(bool(one.falls) for one in reports), np.median([one.stance.force_rms for one in reports])
-    return f"{fell} of {len(NUDGES)}, {100 * residual:.1f} %" if fell else f"{100 * residual:.1f} %"
+    return f"{fell} of {len(PERTURBATIONS)}, {100 * residual:.1f} %" if fell else f"{100 * residual:.1f} %"
 
 
 def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: float) -> str:
     """Number of falls out of all runs; median residual, and largest force and moment of a run [% of their measures]."""
     fell, residuals, most = 0, list[float](), np.zeros(2)
-    for nudge in NUDGES:
+    for nudge in PERTURBATIONS:
         config = run_config(
             **words, seconds=seconds, residual_force=force, residual_moment=moment, mass=DEFAULT_MASS * (1.0 + nudge)
         )
@@ -70,7 +70,7 @@ def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: flo
         residuals.append(rms(size[0, stance]))
         most = np.maximum(most, size[:, up].max(axis=1))
     found = f"{100 * np.median(residuals):.1f} %, {100 * most[0]:.0f} % and {100 * most[1]:.0f} %"
-    return f"{fell} of {len(NUDGES)}, {found}" if fell else found
+    return f"{fell} of {len(PERTURBATIONS)}, {found}" if fell else found
 
 
 def _norms(rows: Array) -> Array:

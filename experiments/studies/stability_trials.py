@@ -23,7 +23,7 @@ _WORLD_INTEGRATOR = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
 FINER = Conditions(substeps=128)
 INTEGRATOR_FINE, INTEGRATOR_COARSE = Conditions(64, _WORLD_INTEGRATOR), Conditions(8, _WORLD_INTEGRATOR)
-COARSE = 1e-4  # [m] a few encoder counts: a smaller oscillation is mostly quantisation
+ROUNDING = 1e-4  # [m] amplitude of a few encoder counts: a smaller oscillation is mostly quantisation
 WITH_COULOMB_FRICTION, ROUNDED = Conditions(coulomb=True), Conditions(coulomb=True, rounded=True)
 
 
@@ -60,7 +60,7 @@ class Row:
     rounded_observed: float
 
 
-def swing_amplitude(trial: Trial, k_r: float) -> float:
+def oscillation_amplitude(trial: Trial, k_r: float) -> float:
     """Amplitude [m] at which the river commands 3 N, which the motors can give anywhere, but at most 1 mm."""
     loop = trial.loop()
     mode = slowest_mode(loop, k_r, trial.b_d, 0, swings=True)[1]
@@ -70,16 +70,16 @@ def swing_amplitude(trial: Trial, k_r: float) -> float:
 def run_trial(trial: Trial) -> Row:
     """Predict and observe one trial under all conditions."""
     expected = predicted(trial)
-    amplitude = swing_amplitude(trial, expected)
-    rubbing = with_friction(trial, amplitude)
+    amplitude = oscillation_amplitude(trial, expected)
+    onset = with_friction(trial, amplitude)
     return Row(
         period=trial.sampling.period, delay=trial.sampling.delay, cutoff=trial.sampling.cutoff, b_d=trial.b_d,
         mass=trial.hand.mass, damping=trial.hand.damping, stiffness=trial.hand.stiffness,
         predicted=expected, observed=observed(trial, expected, FINE),
         own_fine=observed(trial, expected, INTEGRATOR_FINE), own_coarse=observed(trial, expected, INTEGRATOR_COARSE),
-        amplitude=amplitude, friction_predicted=rubbing.k_r,
-        friction_observed=observed_with_friction(trial, rubbing, amplitude, WITH_COULOMB_FRICTION),
-        rounded_observed=observed_with_friction(trial, rubbing, amplitude, ROUNDED) if amplitude > COARSE else np.nan,
+        amplitude=amplitude, friction_predicted=onset.k_r,
+        friction_observed=observed_with_friction(trial, onset, amplitude, WITH_COULOMB_FRICTION),
+        rounded_observed=observed_with_friction(trial, onset, amplitude, ROUNDED) if amplitude > ROUNDING else np.nan,
     )  # fmt: skip
 
 

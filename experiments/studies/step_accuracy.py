@@ -4,8 +4,9 @@
 `docs/validation/physics-step.md`.
 
 The force of a tick depends on the tick in which an encoder count arrives, and any change of step shifts that by a tick.
-So forces are compared not only tick by tick but also below `BAND`, the band of a hand's own motion. Shifted counts also
-move a hand along its curve a little sooner or later, so its path is compared as well as its position at each instant.
+So forces are compared not only tick by tick but also below `BANDWIDTH`, that of a hand's own motion. Shifted counts
+also move a hand along its curve a little sooner or later, so its path is compared as well as its position at each
+instant.
 """
 
 import sys
@@ -31,8 +32,8 @@ from sim.loop.channels import tick_channels
 from sim.loop.loop import Loop
 from sim.loop.servo import FrameLog, TickLog
 
-SECONDS, FINER = 8.0, 8
-BAND = 8.0  # [Hz]; for a hand at 8 cm/s this is a wavelength of a centimetre
+RUN_SECONDS, STEP_RATIO = 8.0, 8
+BANDWIDTH = 8.0  # [Hz]; for a hand at 8 cm/s this is a wavelength of a centimetre
 MODES: Mapping[str, RunConfig] = {
     "follow": run_config(),
     "follow pushed": run_config(user="push"),
@@ -44,10 +45,10 @@ MODES: Mapping[str, RunConfig] = {
     "lead": run_config(mode="lead"),
     "arm": run_config(map="robot-arm", user="push"),
 }
-HEAD = (
-    "| mode | step ms | stylus off the path, and apart at an instant µm RMS "
-    "| force apart below 8 Hz, and tick by tick % | closure µm | joints apart ° RMS "
-    "| figure off its reference ° | falls |\n|---|---|---|---|---|---|---|---|"
+TABLE_HEADER = (
+    "| mode | step ms | stylus from the path, and at the same instant µm RMS "
+    "| difference of force below 8 Hz, and tick by tick % | closure µm | difference of joints ° RMS "
+    "| figure from its reference ° | falls |\n|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -93,7 +94,7 @@ def course(config: RunConfig, step: float) -> Course:
         rows = (channels["p"], channels["force"], q[:, own], frames.reference[:m], gap, frames.report[:m, REPORT_DOWN:])
         parts.append(tuple(channel.copy() for channel in rows))
 
-    Loop(servo, world, keep).run(SECONDS)
+    Loop(servo, world, keep).run(RUN_SECONDS)
     p, force, poses, reference, gap, down = (np.concatenate(rows) for rows in zip(*parts, strict=True))
     falls = int(np.sum(np.diff((down > 0.0).ravel().astype(int)) > 0)) if poses.shape[1] == N_POSE else 0
     closure = PREMIUM_1_5.l1 * float(np.abs(gap).max())
@@ -104,7 +105,7 @@ def row(name: str, step: float, coarse: Course, fine: Course) -> str:
     """A line of the table."""
     apart, path = (1e6 * _rms_norm(difference) for difference in (coarse.p - fine.p, off_path(coarse.p, fine.p)))
     force = 100.0 * _rms_norm(coarse.force - fine.force) / _rms_norm(fine.force)
-    band = butter(2, BAND, fs=1.0 / coarse.period, output="sos")
+    band = butter(2, BANDWIDTH, fs=1.0 / coarse.period, output="sos")
     slow, finer = (np.asarray(sosfiltfilt(band, c.force, axis=0)) for c in (coarse, fine))
     off = ", ".join(f"{np.rad2deg(_pose_error(c.poses, c.reference)):.2f}" for c in (coarse, fine))
     return (
@@ -151,10 +152,10 @@ def main(words: list[str]) -> None:
     if words[:1] == ["--modes"]:
         names, words = words[1].split(","), words[2:]
     steps = [float(word) for word in words] or [1e-3, 5e-4]
-    print(HEAD)
+    print(TABLE_HEADER)
     for name in names:
         for step in steps:
-            print(row(name, step, course(MODES[name], step), course(MODES[name], step / FINER)), flush=True)
+            print(row(name, step, course(MODES[name], step), course(MODES[name], step / STEP_RATIO)), flush=True)
 
 
 if __name__ == "__main__":

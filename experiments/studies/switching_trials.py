@@ -28,10 +28,8 @@ from experiments.studies.field_figures import SPEED, straight_river
 from geometry.arrays import Array
 
 PUSHES = tuple(0.125 * 2.0 ** (0.5 * k) for k in range(11))  # [N] pushes that are tried on every crossing, up to 4 N
-UNCERTIFIED_FORCE, NEVER_LOST_FORCE = (
-    0.025,
-    5.7,
-)  # [N] coordinates in the picture of crossings not certified, and of hands that are never lost
+# [N] coordinates in the picture of crossings that are not certified, and of hands that are never lost
+UNCERTIFIED_FORCE, NEVER_LOST_FORCE = 0.025, 5.7
 
 
 def straight_pair(degrees: float, form: str, hysteresis: float, drag: float = 4.0) -> HigherOrder:
@@ -109,19 +107,16 @@ def outcomes_figure(number: int) -> Figure:
     """Certified force against the least of `PUSHES` that loses the hand in MuJoCo, for random crossings."""
     rng = np.random.default_rng(1)
     crossings = [draw_crossing(rng) for _ in range(number)]
-    lost = [next((force for force in PUSHES if not it.kept(force)), NEVER_LOST_FORCE) for it in crossings]
-    x = [it.allowed if it.allowed > 0.0 else UNCERTIFIED_FORCE for it in crossings]
+    lost = [next((force for force in PUSHES if not crossing.kept(force)), NEVER_LOST_FORCE) for crossing in crossings]
+    x = [crossing.allowed if crossing.allowed > 0.0 else UNCERTIFIED_FORCE for crossing in crossings]
     figure = Figure(figsize=(5.6, 4.4), layout="constrained")
     ax = figure.subplots()
     ends = np.array([UNCERTIFIED_FORCE, NEVER_LOST_FORCE])
     ax.fill_between(ends, [PUSHES[0] / 2.0] * 2, ends, color="#fbe9e7", lw=0, label="would refute the certificate")
-    dots = ax.scatter(x, lost, c=[it.degrees for it in crossings], cmap="viridis", s=28, vmin=0.0, vmax=90.0)
-    ax.set(
-        xscale="log",
-        yscale="log",
-        xlim=(UNCERTIFIED_FORCE / 1.3, NEVER_LOST_FORCE * 1.2),
-        ylim=(PUSHES[0] / 1.5, NEVER_LOST_FORCE * 1.2),
-    )
+    degrees = [crossing.degrees for crossing in crossings]
+    dots = ax.scatter(x, lost, c=degrees, cmap="viridis", s=28, vmin=0.0, vmax=90.0)
+    ax.set(xscale="log", yscale="log")
+    ax.set(xlim=(UNCERTIFIED_FORCE / 1.3, NEVER_LOST_FORCE * 1.2), ylim=(PUSHES[0] / 1.5, NEVER_LOST_FORCE * 1.2))
     ax.set_xticks([UNCERTIFIED_FORCE, 0.1, 0.3, 1.0, 3.0], ["none", "0.1", "0.3", "1", "3"])
     ax.set_yticks([*PUSHES[::2], NEVER_LOST_FORCE], [*(f"{force:.2g}" for force in PUSHES[::2]), "kept"])
     ax.minorticks_off()

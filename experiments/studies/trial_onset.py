@@ -13,7 +13,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import Conditions, Trial, simulate
 from geometry.arrays import Array
 
-LARGEST = 20.0  # ratio to the initial distance beyond which a motion is no longer taken to be linear
+MAX_GROWTH = 20.0  # ratio to the initial distance beyond which a motion is no longer taken to be linear
 
 
 def predicted(trial: Trial) -> float:
@@ -50,7 +50,7 @@ def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
     period = trial.sampling.period
     path = simulate(trial, k_r, int(np.clip(0.2 / period, 120, 500)), conditions)
     size = np.linalg.norm(path, axis=1)
-    beyond = np.flatnonzero(size > LARGEST * conditions.start)
+    beyond = np.flatnonzero(size > MAX_GROWTH * conditions.start)
     end = int(beyond[0]) if len(beyond) else len(path)
     # The first quarter is left out, as fast modes decay in it. Differences are taken, as the error of the weight
     # compensation leaves a constant offset, which is not a mode.
@@ -75,14 +75,14 @@ def _sign_change(rate: Callable[[float], float], guess: float) -> float:
     return float("nan")
 
 
-class Rubbing(NamedTuple):
+class FrictionOnset(NamedTuple):
     """Critical k_r [N/m] predicted with Coulomb friction, and the loop with the equivalent damping."""
 
     k_r: float
     loop: SampledLoop
 
 
-def with_friction(trial: Trial, amplitude: float) -> Rubbing:
+def with_friction(trial: Trial, amplitude: float) -> FrictionOnset:
     """Onset predicted with Coulomb friction, for a motion of a given amplitude across the curve [m].
 
     Describing function: friction f_c on a joint that oscillates with rate amplitude Ω is equivalent to the damping
@@ -96,10 +96,10 @@ def with_friction(trial: Trial, amplitude: float) -> Rubbing:
         linear = replace(frictionless.linear, inverse_rate=frictionless.linear.inverse_rate + np.diag(damping))
         loop = SampledLoop(linear, trial.sampling)
         k_r = float(np.sqrt(k_r * min(critical_stiffness(loop, trial.b_d)[0], 4.0 * k_r)))
-    return Rubbing(k_r, loop)
+    return FrictionOnset(k_r, loop)
 
 
-def observed_with_friction(trial: Trial, guess: Rubbing, amplitude: float, conditions: Conditions) -> float:
+def observed_with_friction(trial: Trial, guess: FrictionOnset, amplitude: float, conditions: Conditions) -> float:
     """Critical k_r [N/m] of the simulation for a motion of a given amplitude [m], which neither grows nor decays.
 
     Each simulation begins in the slowest mode at that amplitude; its first two oscillations are compared.
@@ -108,11 +108,11 @@ def observed_with_friction(trial: Trial, guess: Rubbing, amplitude: float, condi
     def rate(log_k: float) -> float:
         k_r = float(np.exp(log_k))
         value, mode = slowest_mode(guess.loop, k_r, trial.b_d, 0, swings=True)
-        swing = max(4, round(2.0 * np.pi / max(abs(np.angle(value)), 1e-3)))
-        path = simulate(trial, k_r, 2 * swing, conditions, amplitude * mode.real)
-        if len(path) < 2 * swing:
+        samples = max(4, round(2.0 * np.pi / max(abs(np.angle(value)), 1e-3)))
+        path = simulate(trial, k_r, 2 * samples, conditions, amplitude * mode.real)
+        if len(path) < 2 * samples:
             return 1.0
         # The second oscillation may vanish, if the hand comes to rest on the curve.
-        return float(np.log(max(np.linalg.norm(path[swing:]), 1e-12) / np.linalg.norm(path[:swing])))
+        return float(np.log(max(np.linalg.norm(path[samples:]), 1e-12) / np.linalg.norm(path[:samples])))
 
     return _sign_change(rate, guess.k_r)

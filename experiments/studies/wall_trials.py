@@ -23,19 +23,19 @@ from sim.users.hand.actions import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
 _RUN_DURATION = 6.0  # of a run
-BENT, BEND = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
+BENT_JOINT, BENT_ROTATION = "left_elbow", (0.0, 0.0, np.radians(160.0))  # a joint, and a rotation beyond its limits
 
 
-def impossible(clip: Clip) -> Clip:
+def with_broken_elbow(clip: Clip) -> Clip:
     """The clip with its left elbow bent the wrong way."""
     poses = clip.poses.copy()
-    column = N_POSE - 4 * (len(JOINTS) - JOINTS.index(BENT))
-    turn = exponential(*BEND)
+    column = N_POSE - 4 * (len(JOINTS) - JOINTS.index(BENT_JOINT))
+    turn = exponential(*BENT_ROTATION)
     poses[:, column : column + 4] = [multiply(q[0], q[1], q[2], q[3], *turn) for q in poses[:, column : column + 4]]
     return Clip(poses, clip.fps, f"{clip.name} with a broken elbow")
 
 
-class Meeting(NamedTuple):
+class WallRun(NamedTuple):
     """A hand that pushes towards an impossible clip: time [s], radius of the stylus [m], excess [rad]."""
 
     t: Array
@@ -43,11 +43,11 @@ class Meeting(NamedTuple):
     excess: Array
 
 
-def meet(walls: bool) -> Meeting:
-    """Let a hand push outwards, towards the clip with the wrong elbow, in the second half of a lap."""
+def pushed_run(walls: bool) -> WallRun:
+    """Run a hand that pushes outwards, towards the clip with the wrong elbow, in the second half of a lap."""
     inside = embedded("squat_dance")
     config = run_config(seconds=_RUN_DURATION, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
-    session = wire(config, (inside, impossible(inside)))
+    session = wire(config, (inside, with_broken_elbow(inside)))
     frames: list[tuple[Array, Array, Array]] = []
 
     def observe(ticks: TickLog, block: FrameLog, n: int) -> None:
@@ -58,16 +58,16 @@ def meet(walls: bool) -> Meeting:
         frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess))
 
     Loop(session.servo, session.world, observe).run(_RUN_DURATION)
-    return Meeting(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
+    return WallRun(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
 
 
-def wall_figure(without: Meeting, with_walls: Meeting) -> Figure:
+def wall_figure(without: WallRun, with_walls: WallRun) -> Figure:
     """Radius of the stylus and worst joint over time, without walls and with them."""
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     radius, worst = figure.subplots(1, 2)
-    for meeting, color, label in ((without, USER, "without walls"), (with_walls, FIELD, "with walls")):
-        radius.plot(meeting.t, 1e3 * meeting.radius, color=color, label=label)
-        worst.plot(meeting.t, np.degrees(meeting.excess), color=color, label=label)
+    for run, color, label in ((without, USER, "without walls"), (with_walls, FIELD, "with walls")):
+        radius.plot(run.t, 1e3 * run.radius, color=color, label=label)
+        worst.plot(run.t, np.degrees(run.excess), color=color, label=label)
     radius.set(xlabel="time [s]", ylabel="radius of the stylus [mm]", title="the hand pushes outwards from 2 s to 5 s")
     worst.axhline(0.0, color=CURVE, lw=0.8, ls="--")
     worst.set(xlabel="time [s]", ylabel="beyond the limit [°]", title="the worst joint of the figure")
@@ -77,4 +77,5 @@ def wall_figure(without: Meeting, with_walls: Meeting) -> Figure:
 
 if __name__ == "__main__":
     with mpl.rc_context(PLAIN_STYLE):
-        wall_figure(meet(walls=False), meet(walls=True)).savefig(Path(sys.argv[1]) / "soft-walls.png", dpi=150)
+        drawing = wall_figure(pushed_run(walls=False), pushed_run(walls=True))
+        drawing.savefig(Path(sys.argv[1]) / "soft-walls.png", dpi=150)

@@ -23,11 +23,11 @@ from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
 from sim.viewer.shown import Course, courses
 
 FPS = 30.0  # [1/s]
-SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown
+MAX_SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown
 MAGNIFICATION = 4.0  # drawn over true lengths of the device
 PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin is drawn, out of the figure's reach
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
-ARROW = 0.6  # [m] drawn length of a large force (`typical_peak`)
+ARROW_LENGTH = 0.6  # [m] drawn length of a large force (`typical_peak`)
 TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the path of the stylus appears
 # The only notification that a replay can show is that the browser renders in software.
 _HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
@@ -103,7 +103,7 @@ class _Stage:
         self._ghost = Actor(scene, "ghost", figure if self._is_simulated else [], 1.0, GHOST)
         peak = max(typical_peak(self._ticks["force"]), typical_peak(self._ticks["user"]), 1e-9)
         self._arrows = {
-            name: (self._arrow(name, color), ARROW / peak) for name, color in (("force", FIELD), ("user", USER))
+            name: (self._arrow(name, color), ARROW_LENGTH / peak) for name, color in (("force", FIELD), ("user", USER))
         }
         self._grid = scene.add_grid(
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
@@ -147,7 +147,7 @@ class _Stage:
         camera.position, camera.look_at, camera.fov = (4.6, -5.5, 3.3), (0.8, -0.1, 0.75), np.deg2rad(31)
         serializer = server.get_scene_serializer()
         times, frame_times = self._ticks["t"][:], self._frames["t"][:]
-        n = min(int(SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
+        n = min(int(MAX_SECONDS * FPS), int((times[-1] - times[0]) * FPS) + 1)
         replay_times = times[0] + np.arange(n) / FPS
         ticks, frames = (np.minimum(np.searchsorted(t, replay_times), len(t) - 1) for t in (times, frame_times))
         has_reference = "reference" in self._frames

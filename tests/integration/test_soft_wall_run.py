@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from experiments.studies.wall_trials import meet
+from experiments.studies.wall_trials import pushed_run
 
 
 @pytest.mark.slow
 def test_wall_keeps_the_hand_out_of_infeasible_region() -> None:
-    without, with_walls = meet(walls=False), meet(walls=True)
+    without, with_walls = pushed_run(walls=False), pushed_run(walls=True)
     pushed = (without.t > 2.0) & (without.t < 5.0)
     assert np.degrees(without.excess[pushed].max()) > 35.0
     assert np.degrees(with_walls.excess[pushed].max()) < 5.0

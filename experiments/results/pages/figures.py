@@ -27,7 +27,7 @@ from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
 from sim.viewer.shown import courses
 
-POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
+MAX_POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
 PALE_TUBE, PALE_USER, PALE_FALL = "#dbe7f4", "#fbe3cd", "#d5d5d5"
 AXES = ("#2f6db3", "#c2473b", "#7a5195")
 PLAIN_STYLE: dict[Any, Any] = {
@@ -156,7 +156,7 @@ def torques_figure(recording: Recording) -> Figure:
             # A limit far above the torques is left out, as it would squeeze the curve.
             for line in (-limit, limit) if limit < reach else ():
                 ax.axhline(line, color=CURVE, lw=0.8, ls=dashes, label=name if line > 0.0 else None)
-        title = f"motor {i + 1}: {continuous[i]:.0f} mN m for long, {peak[i]:.0f} mN m for a moment"
+        title = f"motor {i + 1}: {continuous[i]:.0f} mN m continuous, {peak[i]:.0f} mN m peak"
         ax.set(title=title, ylabel="τ [mN m]", xlim=(t[0], t[-1]), ylim=(-reach, reach))
     legend_above(axes[0])
     axes[-1].set_xlabel("time [s]")
@@ -194,9 +194,9 @@ def tracking_figure(recording: Recording) -> Figure:
 
 
 def thinned_rows(recording: Recording, name: str, group: str = "ticks") -> Array:
-    """Every k-th row of a channel (n, ...), with the smallest k by which at most `POINTS` rows are left."""
+    """Every k-th row of a channel (n, ...), with the smallest k by which at most `MAX_POINTS` rows are left."""
     channel = recording.channel(group, name)
-    return channel[:: max(1, -(-len(channel) // POINTS))]
+    return channel[:: max(1, -(-len(channel) // MAX_POINTS))]
 
 
 def _panels(rows: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:

@@ -10,7 +10,7 @@ from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
-POINTS = 3000  # most points drawn of a line
+MAX_POINTS = 3000  # most points drawn of a line
 BACK = (0, (4, 2.5))  # line style of the way back
 SUPPORTS = ((2, PALE_TUBE, "on two feet"), (0, PALE_USER, "in flight"))  # single support stays white
 
@@ -21,7 +21,7 @@ def lead_figure(recording: Recording) -> Figure:
     above, moving, feeling = figure.subplots(3, 1, height_ratios=(2.4, 1.0, 1.0))
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     t = recording.channel("frames", "t")[:]
-    stride, n = max(1, len(t) // POINTS), len(t)
+    stride, n = max(1, len(t) // MAX_POINTS), len(t)
     t, s = t[::stride], recording.channel("ticks", "phase")[: n * every : every * stride]
     turned = int(np.argmax(s))
     _draw_paths(above, recording, stride, turned)
@@ -95,9 +95,9 @@ def arm_figure(recording: Recording) -> Figure:
 
 def stretch_figure(recording: Recording, bent: Trajectory) -> Figure:
     """The curve before and after it was bent, and the path of the stylus, from above and from the right [mm]."""
-    before, after = recording.arrays["curve"], bent.point(np.linspace(bent.start, bent.end, POINTS))
+    before, after = recording.arrays["curve"], bent.point(np.linspace(bent.start, bent.end, MAX_POINTS))
     path = recording.channel("ticks", "p")
-    path = path[:: max(1, len(path) // POINTS)]
+    path = path[:: max(1, len(path) // MAX_POINTS)]
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     for ax, (i, j), title in zip(
         figure.subplots(1, 2), ((0, 1), (0, 2)), ("from above", "from the right"), strict=True

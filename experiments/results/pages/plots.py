@@ -12,7 +12,7 @@ from sim.body.falls import UP
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, USER
 
-POINTS = 1500  # most points of a line; in a longer run each point is the largest value of its interval
+MAX_POINTS = 1500  # most points of a line; in a longer run each point is the largest value of its interval
 
 
 class Line(NamedTuple):
@@ -104,7 +104,7 @@ def _plots(recording: Recording) -> list[Plot]:
 
 
 def _interval_maxima(values: Array) -> Array:
-    """Values unchanged, or if there are more than `POINTS`, the largest of each interval, so that no peak is lost."""
-    if len(values) <= POINTS:
+    """Values, or if there are more than `MAX_POINTS`, the largest of each interval, so that no peak is lost."""
+    if len(values) <= MAX_POINTS:
         return values
-    return np.maximum.reduceat(values, np.linspace(0, len(values), POINTS, endpoint=False).astype(int))
+    return np.maximum.reduceat(values, np.linspace(0, len(values), MAX_POINTS, endpoint=False).astype(int))

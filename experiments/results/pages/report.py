@@ -20,7 +20,7 @@ from experiments.results.pages.plots import plots_html
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, PUSH, USER
-from sim.viewer.replay_html import MAGNIFICATION, SECONDS, drawn_tube, replay_html
+from sim.viewer.replay_html import MAGNIFICATION, MAX_SECONDS, drawn_tube, replay_html
 from sim.viewer.shown import courses
 
 
@@ -118,7 +118,7 @@ def write_report(
     """
     t = recording.channel("ticks", "t")
     seconds = float(t[-1] - t[0])
-    replayed = "" if seconds <= SECONDS else f"The replay shows the first {SECONDS:g} of {seconds:.0f} seconds."
+    replayed = "" if seconds <= MAX_SECONDS else f"The replay shows the first {MAX_SECONDS:g} of {seconds:.0f} seconds."
     radius, drawn = float(recording.arrays["tube_radius"]), drawn_tube(recording)
     tube = "" if drawn == radius else f", drawn with a radius of {1e3 * drawn:.0f} mm for its {1e3 * radius:.0f} mm"
     body = _BODY.format(

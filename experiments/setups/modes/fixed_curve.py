@@ -28,7 +28,7 @@ from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
 
-TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
+MOMENT_TUBE = 0.25  # [m] tube radius of the orientation moment where the field has no tube of its own
 
 
 class FixedField(NamedTuple):
@@ -62,7 +62,7 @@ class FixedField(NamedTuple):
     springs: Sequence[tuple[float, float]]
     notes: Notes
     max_urged_speed: float = 0.0
-    tube: float = TUBE
+    tube: float = MOMENT_TUBE
     pushes: tuple[Push, ...] | None = None
     other: Trajectory | None = None
 
@@ -112,7 +112,7 @@ def with_moment(program: Program, moment: OrientationMoment | None, course: Traj
     return program + law.program()
 
 
-DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
+BRAKE_DAMPING = 2e-3  # damping of a joint that exceeds the greatest speed [N m s/rad]
 
 
 def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
@@ -124,7 +124,8 @@ def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
         If a number is out of its interval.
     """
     margin, speed = walls.wall_margin, walls.joint_speed
-    n, narrowest = len(JOINTS), float(np.diff(joint_range(), axis=2).min())
+    n, limits = len(JOINTS), joint_range()
+    narrowest = float(np.diff(limits, axis=2).min())
     if margin > 0.5 * narrowest:
         raise ParameterError(
             f"--wall-margin is {margin:g} rad; expected at most {np.floor(500.0 * narrowest) / 1e3:g} rad, half of the "
@@ -132,7 +133,7 @@ def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
         )
     columns, rows = range(N_POSE - 4 * n, N_POSE, 4), range(N_TANGENT - 3 * n, N_TANGENT, 3)
     return SoftWall(
-        haptic_map, tuple(columns), tuple(rows), tuple(joint_range()), walls.wall_stiffness, margin, DAMPING, speed
+        haptic_map, tuple(columns), tuple(rows), tuple(limits), walls.wall_stiffness, margin, BRAKE_DAMPING, speed
     )
 
 

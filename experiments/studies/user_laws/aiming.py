@@ -5,15 +5,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.studies.user_laws.bare_device import AFTER, Trace, trial
+from experiments.studies.user_laws.bare_device import SETTLING_TIME, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from geometry.arrays import Array
 from sim.users.person.person import Person
 from sim.users.person.wishes import targets
 
 AMPLITUDES, WIDTHS = (0.02, 0.04, 0.08), (0.005, 0.01, 0.02)  # [m]
-TIMES = (0.2, 0.3, 0.4)  # [s] imposed movement times, too short for visual feedback on the end
-MOVES = 10  # movements from side to side; the first two are practice
+MOVEMENT_TIMES = (0.2, 0.3, 0.4)  # [s] imposed movement times, too short for visual feedback on the end
+N_MOVEMENTS = 10  # movements from side to side; the first two are practice
 _N_PRACTICE = 2
 _TRIAL_DURATION = 20.0  # [s] in which also the slowest people complete all movements
 
@@ -50,7 +50,7 @@ def scatter(people: Sequence[Person], seed: int) -> Study:
     falls to zero (Meyer et al. 1988).
     """
     speeds, spreads = list[float](), list[float]()
-    for amplitude, seconds in itertools.product(AMPLITUDES, TIMES):
+    for amplitude, seconds in itertools.product(AMPLITUDES, MOVEMENT_TIMES):
         spread = list[float]()
         for i, person in enumerate(people):
             width = 2.0 * amplitude * person.caution * person.motor_noise / seconds
@@ -78,7 +78,7 @@ def _first_ends(trace: Trace) -> Array:
         if k < _N_PRACTICE:
             continue
         sign = 1.0 if k % 2 == 0 else -1.0
-        move = (trace.t >= start) & (trace.t < end + AFTER)
+        move = (trace.t >= start) & (trace.t < end + SETTLING_TIME)
         position, speed = sign * trace.p[move, 1], sign * trace.v[move, 1]
         fastest = int(np.argmax(speed))
         stopped = np.flatnonzero(speed[fastest:] <= 0.0)
@@ -92,7 +92,7 @@ def _conditions() -> list[tuple[float, float]]:
 
 
 def _tap(person: Person, amplitude: float, width: float, seed: int) -> Trace:
-    points = np.zeros((MOVES + 1, 3))
-    points[:, 1] = 0.5 * amplitude * np.where(np.arange(MOVES + 1) % 2 == 0, -1.0, 1.0)
-    trace = trial(person, targets(points, width), _TRIAL_DURATION, seed, points[0], clicks=MOVES + 1)
-    return trace._replace(clicks=trace.clicks[: MOVES + 1])
+    points = np.zeros((N_MOVEMENTS + 1, 3))
+    points[:, 1] = 0.5 * amplitude * np.where(np.arange(N_MOVEMENTS + 1) % 2 == 0, -1.0, 1.0)
+    trace = trial(person, targets(points, width), _TRIAL_DURATION, seed, points[0], clicks=N_MOVEMENTS + 1)
+    return trace._replace(clicks=trace.clicks[: N_MOVEMENTS + 1])

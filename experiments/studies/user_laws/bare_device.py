@@ -23,7 +23,7 @@ from sim.world.plant import Plant, make_plant
 from sim.world.world import World
 
 PERIOD, STEP, CUTOFF = 1e-3, 5e-4, 150.0  # [s], [s], [Hz]
-AFTER = 0.1  # [s] recorded after the last click, in which the movement comes to rest
+SETTLING_TIME = 0.1  # [s] recorded after the last click, in which the movement comes to rest
 
 
 class Trace(NamedTuple):
@@ -50,7 +50,7 @@ class Trace(NamedTuple):
 def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Array, rows: Array, clicks: int) -> int:
     """Let the device push a person with a force per tick (n, 3) [N], and write the state of the stylus, shape (n, 10).
 
-    Returns the number of ticks written: fewer than n if the run ended `AFTER` [s] after the last of `clicks` clicks.
+    Returns the number of ticks written: fewer than n if it ended `SETTLING_TIME` [s] after the last of `clicks` clicks.
     """
     pressed, last = 0, rows.shape[0]
     for k in range(rows.shape[0]):
@@ -65,7 +65,7 @@ def run_bare(device: SimulatedPhantom, plant: Plant, pushes: Array, applied: Arr
         if rows[k, 9] > 0.0:
             pressed += 1
             if pressed == clicks:
-                last = min(last, k + 1 + round(AFTER / plant.period))
+                last = min(last, k + 1 + round(SETTLING_TIME / plant.period))
     return last
 
 

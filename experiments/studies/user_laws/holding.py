@@ -12,8 +12,8 @@ from geometry.arrays import Array
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following
 
-PUSH, EVERY, REPEATS, WINDOW = 1.0, 1.6, 10, 0.5  # force [N], period [s], number, window of a response [s]
-GRIPS = (1.0, 2.0, 4.0, 8.0)  # [N]
+PUSH_FORCE, PUSH_PERIOD, N_PUSHES, RESPONSE_TIME = 1.0, 1.6, 10, 0.5  # [N], [s], number, [s]
+GRIP_FORCES = (1.0, 2.0, 4.0, 8.0)  # [N]
 HELD_SECONDS = 20.0  # [s] for which the hand holds still
 _HOLD_STILL = Wishes(following(np.zeros((2, 3))), 0.02)
 
@@ -52,21 +52,21 @@ def impedance(person: Person, seed: int) -> tuple[Array, Array, tuple[float, flo
     As in such studies, the person is told not to intervene: she does not correct the response voluntarily.
     """
     person = replace(person, correction=0.0)
-    n, period = round(REPEATS * EVERY / PERIOD), round(EVERY / PERIOD)
-    window = round(WINDOW / PERIOD)
+    n, period = round(N_PUSHES * PUSH_PERIOD / PERIOD), round(PUSH_PERIOD / PERIOD)
+    window = round(RESPONSE_TIME / PERIOD)
     pushes = np.zeros((n, 3))
-    for k in range(1, REPEATS):
-        pushes[k * period : k * period + window, 0] = PUSH * (1.0 if k % 2 else -1.0)
-    trace = trial(person, _HOLD_STILL, REPEATS * EVERY, seed, np.zeros(3), pushes)
+    for k in range(1, N_PUSHES):
+        pushes[k * period : k * period + window, 0] = PUSH_FORCE * (1.0 if k % 2 else -1.0)
+    trace = trial(person, _HOLD_STILL, N_PUSHES * PUSH_PERIOD, seed, np.zeros(3), pushes)
     answers = [
         (1.0 if k % 2 else -1.0) * (trace.p[k * period : k * period + window, 0] - trace.p[k * period - 1, 0])
-        for k in range(1, REPEATS)
+        for k in range(1, N_PUSHES)
     ]
     answer, t = np.mean(answers, axis=0), PERIOD * np.arange(1, window + 1, dtype=np.float64)
     # F = m a + b v + k x is integrated twice, so that no derivative of the measurement is needed.
     once, twice = np.cumsum(answer) * PERIOD, np.cumsum(np.cumsum(answer)) * PERIOD**2
     columns = np.stack([answer, once, twice], axis=1)
-    m, b, k = np.linalg.lstsq(columns, 0.5 * PUSH * t**2, rcond=None)[0]
+    m, b, k = np.linalg.lstsq(columns, 0.5 * PUSH_FORCE * t**2, rcond=None)[0]
     return answer, t, (float(m), float(b), float(k))
 
 
@@ -76,7 +76,7 @@ def step_response(people: Sequence[Person], seed: int) -> Study:
     m, b, k = np.median([values for _, _, values in found], axis=0)
     answers, t = np.mean([answer for answer, _, _ in found], axis=0), found[0][1]
     return Study(
-        "step-response", f"Answer of the arm to a push of {PUSH:g} N",
+        "step-response", f"Response of the arm to a push of {PUSH_FORCE:g} N",
         (
             Law("Step response: mass", float(m), 0.1, 2.5, "kg", "Speich et al. 2005: 1.46; a wrist some 0.1 (m)"),
             Law("Step response: stiffness", float(k), 50.0, 800.0, "N/m", "Mussa-Ivaldi 1985, Tsuji 1995 (m)"),
@@ -91,9 +91,9 @@ def grip(people: Sequence[Person], seed: int) -> Study:
     """Stiffness at the stylus over the force of the grip."""
     stiffness = [
         float(np.median([impedance(replace(person, grip=force), seed + i)[2][2] for i, person in enumerate(people)]))
-        for force in GRIPS
+        for force in GRIP_FORCES
     ]
-    x, y = np.array(GRIPS), np.array(stiffness)
+    x, y = np.array(GRIP_FORCES), np.array(stiffness)
     slope, intercept = np.polyfit(np.log(x), np.log(np.maximum(y, 1e-9)), 1)
     return Study(
         "grip", "Stiffness at the stylus over grip",

@@ -12,12 +12,13 @@ from geometry.arrays import Array
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following
 
-LAPS, LAP, RADIUS, PUSH = 24, 2.0, 0.04, 1.5  # laps of tracing; their duration [s], radius [m], recurring force [N]
-LEARNING = 0.15  # share of an error that people who learn correct per repetition
+N_LAPS, LAP_DURATION, RADIUS = 24, 2.0, 0.04  # laps of tracing; their duration [s] and radius [m]
+PUSH_FORCE = 1.5  # [N] recurring in every lap
+LEARNING_RATE = 0.15  # share of an error that people who learn correct per repetition
 LOADS = (0.25, 0.4, 0.6, 0.8)  # shares of the person's strength; published models cover 10 to 90 %
 FATIGUE, STRENGTH = 0.6, 6.0  # rate for the grip [1/min]; strength that the device can load [N]
-BEGUN = 2.0  # [s] in which the person takes up the load
-SLIPPED = 0.02  # [m] displacement from which a hand counts as no longer holding
+LOADING_TIME = 2.0  # [s] in which the person takes up the load
+SLIP_DISTANCE = 0.02  # [m] displacement from which a hand counts as no longer holding
 _SAMPLE_TIME = 0.01  # [s] between wishes
 
 
@@ -27,19 +28,20 @@ def practice(people: Sequence[Person], seed: int) -> Study:
     Individual practice curves are exponential, e = a + b exp(-c n), rather than a power of n (Heathcote, Brown &
     Mewhort 2000: 475 people, in all data sets that are not averaged).
     """
-    t = np.arange(0.0, (LAPS + 1) * LAP, _SAMPLE_TIME)
-    angle, n = 2.0 * np.pi * t / LAP, round(LAPS * LAP / PERIOD)
+    t = np.arange(0.0, (N_LAPS + 1) * LAP_DURATION, _SAMPLE_TIME)
+    angle, n = 2.0 * np.pi * t / LAP_DURATION, round(N_LAPS * LAP_DURATION / PERIOD)
     points = RADIUS * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-    phase = 2.0 * np.pi * PERIOD * np.arange(n) / LAP
-    pushes = np.asarray(PUSH * np.stack([np.cos(2.0 * phase), np.sin(2.0 * phase), 0.0 * phase], axis=1), np.float64)
+    phase = 2.0 * np.pi * PERIOD * np.arange(n) / LAP_DURATION
+    pushes: Array = PUSH_FORCE * np.stack([np.cos(2.0 * phase), np.sin(2.0 * phase), 0.0 * phase], axis=1)
     wanted = RADIUS * np.stack([np.cos(phase), np.sin(phase), 0.0 * phase], axis=1)
     curves = list[Array]()
     for i, person in enumerate(people):
-        learner = replace(person, learning=LEARNING, entrainment=0.0)
-        trace = trial(learner, Wishes(following(points), _SAMPLE_TIME, LAP), LAPS * LAP, seed + i, points[0], pushes)
-        off = np.linalg.norm(trace.p - wanted, axis=1).reshape(LAPS, -1)
+        learner = replace(person, learning=LEARNING_RATE, entrainment=0.0)
+        wishes = Wishes(following(points), _SAMPLE_TIME, LAP_DURATION)
+        trace = trial(learner, wishes, N_LAPS * LAP_DURATION, seed + i, points[0], pushes)
+        off = np.linalg.norm(trace.p - wanted, axis=1).reshape(N_LAPS, -1)
         curves.append(np.sqrt(np.mean(off**2, axis=1))[1:])
-    number = np.arange(1.0, LAPS)
+    number = np.arange(1.0, N_LAPS)
     fits = [(_fit_law(number, curve, _exponential_law), _fit_law(number, curve, _power_law)) for curve in curves]
     rate = float(np.median([one[0][2] for one, _ in fits]))
     worse = float(np.median([other[1] / one[1] for one, other in fits]))
@@ -67,7 +69,7 @@ def endurance(people: Sequence[Person], seed: int) -> Study:
         pushes = np.zeros((round(seconds / PERIOD), 3))
         pushes[:, 0] = load * STRENGTH * np.minimum(1.0, PERIOD * np.arange(len(pushes)))
         trace = trial(weak, Wishes(following(np.zeros((2, 3)))), seconds, seed, np.zeros(3), pushes)
-        slipped = (np.linalg.norm(trace.p, axis=1) > SLIPPED) & (trace.t > BEGUN)
+        slipped = (np.linalg.norm(trace.p, axis=1) > SLIP_DISTANCE) & (trace.t > LOADING_TIME)
         times.append(float(trace.t[np.argmax(slipped)]) if np.any(slipped) else np.nan)
     x, y = np.array(LOADS), np.array(times)
     slope, intercept = np.polyfit(np.log(x), np.log(y), 1)

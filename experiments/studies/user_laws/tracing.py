@@ -14,13 +14,13 @@ from sim.users.person.pace import natural_times
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following
 
-LAPS = 7  # laps of an ellipse, of which the first is practice
+N_LAPS = 7  # laps of an ellipse, of which the first is practice
 RADIUS = 0.04  # of the circular tunnel [m]
 DIFFICULTIES = (10.0, 15.0, 20.0, 30.0, 40.0)  # length over width; 10.7 to 42.7 in Yamanaka et al. 2017
 PACES = (0.6, 1.0, 1.7, 2.8, 4.5)  # durations of a practised lap [s]
-ERRORS = 0.064  # share of passages that touch a wall (Accot & Zhai 1997)
-PRACTISED, PASSED = 9, 9  # laps per pace in practice, and per tunnel; the first and the last are not evaluated
-LEAST = 5  # fewest of these that go all the way round, at a pace that the person can hold
+ERROR_RATE = 0.064  # share of passages that touch a wall (Accot & Zhai 1997)
+N_PRACTICE_LAPS, N_TUNNEL_LAPS = 9, 9  # per pace in practice, and per tunnel; the first and the last are not evaluated
+MIN_LAPS = 5  # fewest of these that go all the way round, at a pace that the person can hold
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # durations of a lap [s]
 _SAMPLE_TIME, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
@@ -30,15 +30,15 @@ def steering(people: Sequence[Person], seed: int) -> Study:
     """Steering law: time to pass a circular tunnel over its length by its width (protocol of Accot & Zhai 1997).
 
     A tunnel of a given width is passed as fast as possible without touching its walls. From practice the person knows
-    the deviation of her laps at each pace, and takes the fastest pace at which no more than `ERRORS` of them touch. New
-    laps at that pace are evaluated; those that touch are errors and left out.
+    the deviation of her laps at each pace, and takes the fastest pace at which no more than `ERROR_RATE` of them touch.
+    New laps at that pace are evaluated; those that touch are errors and left out.
     """
     widths = 2.0 * np.pi * RADIUS / np.array(DIFFICULTIES)
     times, touched = np.full((len(people), len(widths)), np.nan), list[Array]()
     for i, person in enumerate(people):
         paces = _chosen_paces(person, widths, seed + i)
         for k, (pace, width) in enumerate(zip(paces, widths, strict=True)):
-            farthest, lasted = _traced_laps(person, pace, PASSED, seed + 1000 * (k + 1) + i)
+            farthest, lasted = _traced_laps(person, pace, N_TUNNEL_LAPS, seed + 1000 * (k + 1) + i)
             touches = farthest > 0.5 * width
             touched.append(touches)
             if not np.all(touches):
@@ -60,17 +60,17 @@ def steering(people: Sequence[Person], seed: int) -> Study:
 
 
 def _chosen_paces(person: Person, widths: Array, seed: int) -> Array:
-    """Duration of a lap [s] at which a share `ERRORS` of the laps touches the walls, for each width [m].
+    """Duration of a lap [s] at which a share `ERROR_RATE` of the laps touches the walls, for each width [m].
 
     At each practised pace, the needed width follows from a normal distribution of the laps' deviations; it decreases
     with the duration (isotonic regression), with linear interpolation. Paces that the person cannot hold are left out.
     """
     held, needed = list[float](), list[float]()
     for pace in PACES:
-        farthest, _ = _traced_laps(person, pace, PRACTISED, seed)
-        if len(farthest) >= LEAST:
+        farthest, _ = _traced_laps(person, pace, N_PRACTICE_LAPS, seed)
+        if len(farthest) >= MIN_LAPS:
             held.append(pace)
-            needed.append(float(2.0 * (np.mean(farthest) + norm.isf(ERRORS) * np.std(farthest, ddof=1))))
+            needed.append(float(2.0 * (np.mean(farthest) + norm.isf(ERROR_RATE) * np.std(farthest, ddof=1))))
     falling = isotonic_regression(needed, increasing=False).x
     return np.interp(widths, falling[::-1], held[::-1])
 
@@ -99,9 +99,9 @@ def power_law(people: Sequence[Person], seed: int) -> Study:
         angle = np.linspace(0.0, 2.0 * np.pi, 257)
         drawn = np.stack([long * np.cos(angle), short * np.sin(angle), np.zeros_like(angle)], axis=1)
         times = natural_times(drawn, lap)
-        t = np.arange(0.0, (LAPS + 1) * lap, _SAMPLE_TIME)
+        t = np.arange(0.0, (N_LAPS + 1) * lap, _SAMPLE_TIME)
         points = np.stack([np.interp(t % lap, times, drawn[:, k]) for k in range(3)], axis=1)
-        trace = trial(person, _wishes(points, lap), LAPS * lap, seed + i, points[0])
+        trace = trial(person, _wishes(points, lap), N_LAPS * lap, seed + i, points[0])
         kappa, speed = _curvature(trace, lap)
         exponents.append(-float(np.polyfit(np.log(kappa), np.log(speed), 1)[0]))
         curvatures.append(kappa[::40])

@@ -15,7 +15,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.state import HandState
 from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA, river_bundle
-from experiments.studies.field_figures import SPEED, crossing, eight, straight_river
+from experiments.studies.field_figures import SPEED, crossing, figure_of_eight, straight_river
 from tests.controllers.fields.field_probes import force_of, largest_jump, mass_in, run_over
 
 SCALE = (ADMISSION * SPEED, SIGMA["discrete"] * SPEED, HYSTERESIS * SPEED)
@@ -208,7 +208,7 @@ def test_coincident_rivers_act_as_one():
 
 @pytest.mark.parametrize("form", ["smooth", "discrete"])
 def test_mass_passes_straight_through_the_crossing_of_a_figure_eight(form):
-    curve = eight()
+    curve = figure_of_eight()
     program = HigherOrder(_bundle(River(curve, 0.012, 0.013, DRAG)), *(2.0 * s for s in SCALE), form).program()
     path, memory = mass_in(program, curve.point(0.0), curve.velocity(0.0), np.zeros((8000, 3)))
     # After two laps it is where the river should have carried it.
@@ -284,7 +284,7 @@ def test_smooth_field_is_continuous_in_space():
     rng = np.random.default_rng(5)
     bundles = [
         _bundle(straight_river(0.0), straight_river(70.0), straight_river(110.0)),
-        _bundle(River(eight(), 0.012, 0.02, 4.0), straight_river(20.0)),
+        _bundle(River(figure_of_eight(), 0.012, 0.02, 4.0), straight_river(20.0)),
     ]
     for bundle in bundles:
         program = HigherOrder(bundle, *SCALE).program()
@@ -310,7 +310,7 @@ def test_smooth_field_is_continuous_in_velocity():
 RING = Trajectory.circle(0.05, 4.0)
 _HALT = Trajectory([0.0, 1.0, 2.0, 3.0], [[0, 0, 0], [0.02, 0, 0], [0.02, 0, 0], [0.04, 0.01, 0]])
 FIELDS = [
-    HigherOrder(_bundle(River(RING), River(RING, np.inf), River(_HALT), River(eight())), *SCALE, form)
+    HigherOrder(_bundle(River(RING), River(RING, np.inf), River(_HALT), River(figure_of_eight())), *SCALE, form)
     for form in ("smooth", "discrete")
 ]
 

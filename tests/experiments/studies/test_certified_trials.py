@@ -5,7 +5,7 @@ import pytest
 
 from experiments.certify.trial_simulation import FULL_CONDITIONS
 from experiments.studies import certified_trials
-from experiments.studies.certified_trials import ASSUMED, Release, draw_certified, release
+from experiments.studies.certified_trials import ASSUMED_CONDITIONS, Release, draw_certified, release
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def test_released_hands_in_certified_river_do_not_diverge(drawn, tmp_path, monke
 def test_trials_detect_a_river_stiffer_than_certified(drawn):
     wild = drawn._replace(river=drawn.river._replace(k_r=60.0 * drawn.river.k_r), radius=0.97)
     rng = np.random.default_rng(5)
-    assert all(release(wild, conditions, rng).diverges for conditions in (ASSUMED, FULL_CONDITIONS))
+    assert all(release(wild, conditions, rng).diverges for conditions in (ASSUMED_CONDITIONS, FULL_CONDITIONS))
 
 
 def test_hand_held_by_friction_does_not_count_as_diverging():

@@ -190,7 +190,7 @@ def test_change_waits_for_landing_or_takeoff(first: str, second: str) -> None:
         poses = played_change(rivers, 0, 1, moment)
         change = measured_change(poses)
         # Changes that begin in the air or end in a flight threw the root by up to 5.9 m/s within a step.
-        assert change.up < 0.3
+        assert change.vertical_jump < 0.3
         assert change.height < 0.28  # the jump's own 0.27
         assert change.slide < 0.03
         changed += np.abs(pose_difference(poses[-1:], played_change(rivers, 0, 0, moment)[-1:])).max() > 0.3
@@ -245,9 +245,9 @@ def test_velocity_is_continuous_in_difficult_changes(
     finer = measured_change(played_change(rivers, first, second, moment, PERIOD / 8.0), PERIOD / 8.0)
     # A discontinuity would not shrink with the time step.
     assert np.all(np.array(finer[3:]) < 0.5 * np.array(change[3:]))
-    assert change.over < 0.4
-    assert change.up < 0.2
-    assert change.joint < 30.0
+    assert change.horizontal_jump < 0.4
+    assert change.vertical_jump < 0.2
+    assert change.joint_jump < 30.0
     assert change.slide < 0.03
 
 
@@ -256,9 +256,9 @@ def test_figure_stops_smoothly_when_the_hand_is_thrown_off_the_river(first: int,
     rivers = rivers_that_play(("run", "jump", "walk"))
     stop = measured_change(played_change(rivers, first, None, moment))
     # If the hand is followed up to twice the clip's pace, the root leaps by up to 3.7 m/s and joints by 114 rad/s.
-    assert stop.over < 1.0
-    assert stop.up < 0.5
-    assert stop.joint < 32.0
+    assert stop.horizontal_jump < 1.0
+    assert stop.vertical_jump < 0.5
+    assert stop.joint_jump < 32.0
 
 
 def test_transitions_match_golden_poses(clips_of_rivers) -> None:

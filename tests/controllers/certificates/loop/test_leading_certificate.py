@@ -24,7 +24,7 @@ from experiments.certify.trial_simulation import Conditions, simulate
 from experiments.config.modes import Lead
 from experiments.config.options import run_config
 from experiments.setups.parts.leading_hand import s_curve
-from experiments.studies.leading_trials import SCALE, TRIALS, UPRIGHT, leading_trial
+from experiments.studies.leading_trials import SCALE, STIFFNESS_RATIO, TRIALS, leading_trial
 from experiments.studies.trial_onset import observed, predicted
 from models.mocap.library import embedded
 from tests.derivatives import central_differences
@@ -34,7 +34,7 @@ FLUTTER = Regime(True, True, True, 3.0)
 
 
 def _river(regime, b=8.0):
-    return River(regime.law(SCALE, UPRIGHT), 120.0, b, np.inf, CURVE, DEVICE, Sampling(1e-3))
+    return River(regime.law(SCALE, STIFFNESS_RATIO), 120.0, b, np.inf, CURVE, DEVICE, Sampling(1e-3))
 
 
 @pytest.mark.parametrize("name", TRIALS)
@@ -81,7 +81,7 @@ def test_walker_state_follows_linear_maps(regime, delay):
     hand, b, scale = HandImpedance(0.05, 0.5, 20.0), 6.0, 40.0
     sampling = Sampling(1e-3, delay)
     trial = leading_trial(regime, 0.3, b, sampling)
-    linear = linearise(DEVICE, regime.law(scale, UPRIGHT), trial.curve, np.array([trial.phase]), hand)
+    linear = linearise(DEVICE, regime.law(scale, STIFFNESS_RATIO), trial.curve, np.array([trial.phase]), hand)
     loop = SampledLoop(linear, sampling)
     c, s = regime.tangent(linear.velocity[0])
     gait = Gait(1.4, 0.01, np.array([2, 2]), 0.45)

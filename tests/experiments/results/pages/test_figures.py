@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from experiments.results.measures.changes import RiverChange
 from experiments.results.pages import figures
 from experiments.results.pages.figures import (
-    POINTS,
+    MAX_POINTS,
     STYLE,
     deviation_figure,
     draw_figures,
@@ -215,7 +215,7 @@ def test_torques_are_shown_with_motor_limits(recording, tmp_path):
         assert values(ax, "continuous")[0] == pytest.approx(continuous)
         low, high = ax.get_ylim()
         assert low < torque < high
-        assert f"{continuous} mN m for long, {peak} mN m for a moment" in ax.get_title()
+        assert f"{continuous} mN m continuous, {peak} mN m peak" in ax.get_title()
         # A line that is not in view is not in the legend.
         assert all(low <= line.get_ydata()[0] <= high for line in ax.lines)
     with record(tmp_path / "weak.h5", texts={"motor_peak": np.array([0.15, 0.2, 0.25])}) as weak:
@@ -234,9 +234,9 @@ def test_tracking_figure_units_and_shaded_flights_and_falls(recording):
 
 
 def test_long_recording_is_thinned(tmp_path):
-    with record(tmp_path / "long.h5", n=3 * POINTS + 7) as recording:
+    with record(tmp_path / "long.h5", n=3 * MAX_POINTS + 7) as recording:
         drawn = values(path_figure(recording).axes[0], "hand")
-    assert POINTS / 2 < len(drawn) <= POINTS
+    assert MAX_POINTS / 2 < len(drawn) <= MAX_POINTS
 
 
 def test_nothing_is_shaded_without_pushes(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.results.pages.plots import POINTS, plots_html
+from experiments.results.pages.plots import MAX_POINTS, plots_html
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
@@ -33,11 +33,11 @@ def test_plot_data_matches_recording_including_a_one_tick_peak(tmp_path: Path) -
     assert (data["start"], data["end"]) == (0.0, pytest.approx(19.999))
     distance, forces = data["plots"]
     (line,) = distance["lines"]
-    assert len(line["y"]) == POINTS
+    assert len(line["y"]) == MAX_POINTS
     assert line["y"][-1] == pytest.approx(10.0, rel=1e-3)  # [mm]
     field = np.array(forces["lines"][0]["y"])
     assert field.max() == 7.0
-    assert np.argmax(field) / POINTS == pytest.approx(12_345 / N, abs=1.5 / POINTS)
+    assert np.argmax(field) / MAX_POINTS == pytest.approx(12_345 / N, abs=1.5 / MAX_POINTS)
     assert len(html) < 60_000
     assert "from </script>" not in html
 

@@ -10,42 +10,42 @@ from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.governor import Governed, animation_along
 from experiments.setups.wiring import wire
-from experiments.studies.rate_trials import DRAG, Bench
+from experiments.studies.rate_trials import DRAG, LedBackflip
 from models.mocap.library import embedded
 
 
 @pytest.fixture(scope="module")
-def bench():
-    return Bench()
+def backflip():
+    return LedBackflip()
 
 
-def test_admissible_speeds_come_from_the_flight_of_the_clip(bench):
+def test_admissible_speeds_come_from_the_flight_of_the_clip(backflip):
     """By the clip's certificate, not by the map: σ |φ̇| in its flight, at the phases at which it flies."""
     clip = embedded("backflip")
     (flight,) = clip_ballistics(clip).flights
-    pace = bench.curve.length / clip.duration
-    flying = bench.speeds[:, 0] > 0.0
-    np.testing.assert_allclose(bench.speeds[flying], np.tile(pace * np.array(flight.admissible), (flying.sum(), 1)),
+    pace = backflip.curve.length / clip.duration
+    flying = backflip.speeds[:, 0] > 0.0
+    np.testing.assert_allclose(backflip.speeds[flying], np.tile(pace * np.array(flight.admissible), (flying.sum(), 1)),
                                rtol=5e-3)  # fmt: skip
-    first, last = (share / bench.curve.duration * clip.duration for share in bench.flight)
+    first, last = (share / backflip.curve.duration * clip.duration for share in backflip.flight)
     assert first == pytest.approx(flight.fit.time, abs=0.02)
     assert last == pytest.approx(flight.fit.time + flight.fit.duration, abs=0.02)
 
 
-def test_gate_admits_only_hands_at_speed(bench):
-    least = bench.speeds[:, 0].max()
-    slow, slow_share = bench.taken(0.3 * least)
-    right, right_share = bench.taken(1.05 * least)
+def test_gate_admits_only_hands_at_speed(backflip):
+    least = backflip.speeds[:, 0].max()
+    slow, slow_share = backflip.taken_at(0.3 * least)
+    right, right_share = backflip.taken_at(1.05 * least)
     assert slow == pytest.approx(0.3 * least, rel=0.1)
     assert slow_share == 0.0
     assert right == pytest.approx(1.05 * least, rel=0.15)
     assert right_share > 0.9
 
 
-def test_hand_that_slows_down_in_flight_meets_a_force(bench):
-    passage = bench.led(bench.governor(), bench.slowing(0.05))
-    first, last = bench.flight
-    least = bench.speeds[:, 0].max()
+def test_hand_that_slows_down_in_flight_meets_a_force(backflip):
+    passage = backflip.passage(backflip.governor(), backflip.slowing_path(0.05))
+    first, last = backflip.flight
+    least = backflip.speeds[:, 0].max()
     before = (passage.phase > first - 0.2) & (passage.phase < first - 0.05)
     slow = (passage.phase > last - 0.15) & (passage.phase < last - 0.05)
     assert np.abs(passage.along[before]).max() < 0.01

@@ -1,31 +1,31 @@
-"""Figures of `hvf bench`: bounds, verdicts, exit code, JSON, and the configurations of the benchmarked modes."""
+"""Results of `hvf bench`: bounds, verdicts, exit code, JSON, and the configurations of the benchmarked modes."""
 
 import json
 
 import pytest
 
-from experiments.bench.figures import BenchmarkResult, print_figures
+from experiments.bench.results import BenchmarkResult, print_results
 from experiments.bench.tick_cost import MODES
 
-FIGURES = (
+RESULTS = (
     BenchmarkResult("a tick", 1.4, "mj_steps", at_most=1.5),
     BenchmarkResult("threads", 0.8, at_least=0.9),
     BenchmarkResult("told", 3.0),
 )
 
 
-def test_check_prints_verdicts_and_fails_if_any_figure_fails(
+def test_check_prints_verdicts_and_fails_if_any_benchmark_fails(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert [figure.passes for figure in FIGURES] == [True, False, None]
-    assert print_figures(FIGURES, False, True) == 1
+    assert [result.passes for result in RESULTS] == [True, False, None]
+    assert print_results(RESULTS, False, True) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "pass  a tick: 1.4 mj_steps (≤ 1.5)"
     assert lines[1] == "FAIL  threads: 0.8 (≥ 0.9)"
     assert lines[2] == "      told: 3"
-    assert lines[3] == "1 of 3 figures fail: threads"
-    assert print_figures(FIGURES, False, False) == 0
-    assert print_figures((FIGURES[0], FIGURES[2]), False, True) == 0
+    assert lines[3] == "1 of 3 benchmarks fail: threads"
+    assert print_results(RESULTS, False, False) == 0
+    assert print_results((RESULTS[0], RESULTS[2]), False, True) == 0
 
 
 def test_nan_fails_upper_and_lower_bounds() -> None:
@@ -34,7 +34,7 @@ def test_nan_fails_upper_and_lower_bounds() -> None:
 
 
 def test_json_output_has_values_bounds_and_verdicts(capsys: pytest.CaptureFixture[str]) -> None:
-    assert print_figures(FIGURES, True, True) == 1
+    assert print_results(RESULTS, True, True) == 1
     result = json.loads(capsys.readouterr().out)
     assert [one["passes"] for one in result] == [True, False, None]
     assert result[0] == {

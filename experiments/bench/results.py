@@ -45,16 +45,16 @@ class BenchmarkResult:
         return f"{verdict}  {self.name}: {self.value:.3g}{' ' * bool(self.unit)}{self.unit}{bounds_text}"
 
 
-def print_figures(figures: Iterable[BenchmarkResult], as_json: bool, check: bool) -> int:
-    """Print figures as they are measured, or all as JSON; returns the exit code, 1 if `check` is set and one fails."""
+def print_results(results: Iterable[BenchmarkResult], as_json: bool, check: bool) -> int:
+    """Print results as they are measured, or all as JSON; returns the exit code, 1 if `check` is set and one fails."""
     printed: list[BenchmarkResult] = []
-    for figure in figures:
-        printed.append(figure)
+    for result in results:
+        printed.append(result)
         if not as_json:
-            print(figure.line(), flush=True)
-    failed = [figure.name for figure in printed if figure.passes is False]
+            print(result.line(), flush=True)
+    failed = [result.name for result in printed if result.passes is False]
     if as_json:
-        print(json_text([asdict(figure) | {"passes": figure.passes} for figure in printed]))
+        print(json_text([asdict(result) | {"passes": result.passes} for result in printed]))
     elif failed:
-        print(f"{len(failed)} of {len(printed)} figures fail: {'; '.join(failed)}")
+        print(f"{len(failed)} of {len(printed)} benchmarks fail: {'; '.join(failed)}")
     return 1 if check and failed else 0

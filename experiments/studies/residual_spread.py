@@ -1,6 +1,6 @@
 """Spread of the residuals in README's table: over start positions, weights of the figure, and OpenBLAS kernels.
 
-``python -m experiments.studies.row_spread [CORE...]`` runs each row of README's table that states a residual three
+``python -m experiments.studies.residual_spread [CORE...]`` runs each row of README's table that states a residual three
 times with each of the given OpenBLAS kernels (``OPENBLAS_CORETYPE``: Haswell, SkylakeX, Zen; by default those of this
 processor), and prints the table of `docs/validation/residual-bounds.md`. A figure with contacts is chaotic: the runs
 differ in the seed, which sets where the hand lets go of the stylus, and in the sixth digit of the figure's weight.
@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from models.humanoid.skeleton import DEFAULT_MASS
 
 README = Path(__file__).parents[2] / "README.md"
-NUDGES = ((0, 0.0), (1, 1e-6), (2, -1e-6))
+PERTURBATIONS = ((0, 0.0), (1, 1e-6), (2, -1e-6))
 """Seed, and relative change of the figure's weight, of each repetition."""
 
 _ROW = re.compile(r"^\| [^|]+ \| `(hvf (?:run|lift) [^`]+)` \| ([^|]+) \|$", re.MULTILINE)
@@ -61,7 +61,7 @@ def main(cores: Sequence[str]) -> None:
             runs = [
                 measured(f"{line} --seed {seed} --mass {DEFAULT_MASS * (1.0 + nudge)!r}", folder, core)
                 for core, folder in folders.items()
-                for seed, nudge in NUDGES
+                for seed, nudge in PERTURBATIONS
             ]
             residuals, falls = [residual for residual, _ in runs], sum(fell for _, fell in runs)
             print(
