@@ -12,11 +12,8 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.state import POSITION
 from experiments.certify.trial_simulation import trial_model
 from geometry.arrays import Array
-from models.phantom.kinematics import jacobian, linkage_angles, vector_to_hand_frame
-from models.phantom.spec import LINKAGE_JOINTS
-from models.world.scene import PHANTOM
 from sim.world.phantom_port import actuate, phantom_port, sense, sensed_before
-from sim.world.world import phantom_angles
+from sim.world.world import place_stylus
 
 SUBSTEPS = 8
 
@@ -31,16 +28,10 @@ def simulated_course(
     model = trial_model(HandImpedance(), sampling.period / SUBSTEPS, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
     data = mujoco.MjData(model)
     port = phantom_port(model, data, sampling.period, sampling.cutoff)
-    theta = np.array(phantom_angles(start))
-    columns = [vector_to_hand_frame(column) for column in np.array(jacobian(theta)).T]
-    rate = np.linalg.solve(np.array(columns).T, velocity).astype(np.float64)
-    angles, rates = linkage_angles.py_func(theta), linkage_angles.py_func(rate)
-    for name, angle, speed in zip(LINKAGE_JOINTS, angles, rates, strict=True):
-        joint = data.joint(PHANTOM + name)
-        joint.qpos[0], joint.qvel[0] = angle, speed
+    place_stylus(model, data, start, v_H=velocity)
     mujoco.mj_forward(model, data)
     # The velocity filter starts settled at the initial velocity.
-    sensed_before(port, theta, rate)
+    sensed_before(port, data.qpos[list(port.arm_q)], data.qvel[list(port.arm_v)])
     program = field.program()
     memory, wrench = program.fresh_memory(), np.zeros(6)
     n = round(seconds / sampling.period)

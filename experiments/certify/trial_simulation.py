@@ -5,7 +5,7 @@ Unlike the servo, a trial can have torques delayed by whole periods, encoders wi
 or another integrator.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import FunctionType
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ from sim.world.world import phantom_angles
 
 LAP_DURATION = 1e6  # [s] duration of a lap, so slow that a trial stays at one configuration
 INITIAL_DISTANCE = 1e-6  # [m] distance from the curve at which a trial starts
+_MAX_DISTANCE = 0.05  # [m] distance from its start at which a trial ends
 
 
 @njit
@@ -95,7 +96,7 @@ def run_delayed(
                 port.ctrl[port.motor[i]] = late[slot, i]
                 late[slot, i] = port.torque[i]
             path[k, i] = port.hand[HAND_POSITION + i]
-        if np.sum((path[k] - path[0]) ** 2) > 0.05**2:
+        if np.sum((path[k] - path[0]) ** 2) > _MAX_DISTANCE**2:
             break
         advance(plant, port, hand, t, False, applied)
 
@@ -144,7 +145,7 @@ class Trial:
 
 
 def draw_trial(rng: np.random.Generator) -> Trial:
-    """A random trial: curve, phase, clock, hand, and a damping of 5 to 70 % of the critical damping."""
+    """A random trial: curve, phase, clock, hand, and a damping of 5 to 70 % of the largest stable one."""
     while True:
         radius, centre = rng.uniform(0.02, 0.06), rng.uniform([-0.06, -0.08, -0.06], [0.06, 0.08, 0.1])
         axes = np.linalg.qr(rng.normal(size=(3, 3)))[0][:, :2]
@@ -168,13 +169,11 @@ def draw_trial(rng: np.random.Generator) -> Trial:
         sideways = rng.normal(size=3)
         sideways -= tangent * (tangent @ sideways)
         trial = Trial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
-        loop = trial.loop()
-        max_damping = _critical_damping(loop)
-        return Trial(curve, phase, float(rng.uniform(0.05, 0.7)) * max_damping, sampling, hand, trial.direction)
+        return replace(trial, b_d=float(rng.uniform(0.05, 0.7)) * _max_stable_damping(trial.loop()))
 
 
-def _critical_damping(loop: SampledLoop) -> float:
-    """Largest stable b_d [N s/m] at a stiffness of 1 N/m."""
+def _max_stable_damping(loop: SampledLoop) -> float:
+    """Largest stable b_d [N s/m] at a stiffness of 1 N/m, of 60 values."""
     gains = np.geomspace(0.05, 500.0, 60)
     stable = [bool(loop.radius(1.0, b)[0] < 1.0) for b in gains]
     first = int(np.argmin(stable)) if not all(stable) else len(gains) - 1
@@ -197,6 +196,14 @@ def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: muj
     mujoco.mju_mat2Quat(quaternion, R_WP.ravel())
     spec.attach(device, prefix=PHANTOM, frame=spec.worldbody.add_frame(quat=quaternion.tolist()))
     return spec.compile()
+
+
+def linkage_plant(model: mujoco.MjModel, data: mujoco.MjData, port: PhantomPort, substeps: int) -> Plant:
+    """A plant of the Phantom alone; model, data and port must outlive it."""
+    return Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=np.zeros(3), arm_v=port.arm_v, substeps=substeps, period=port.period,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -272,11 +279,7 @@ def hand_path(
     for name, angle, speed in zip(names, angles, rates, strict=True):
         data.joint(name).qpos[0], data.joint(name).qvel[0] = angle, speed
     mujoco.mj_forward(model, data)
-    a, b, c = (int(model.joint(name).dofadr[0]) for name in names[:3])
-    plant = Plant(
-        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
-        ground=np.zeros(3), arm_v=(a, b, c), substeps=conditions.substeps, period=period,
-    )  # fmt: skip
+    plant = linkage_plant(model, data, port, conditions.substeps)
     hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
     field = Executed(program.compiled(), program.fresh_memory(), program.fresh_walkers())

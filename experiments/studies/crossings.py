@@ -21,7 +21,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.safety.limiter import ForceLimiter, limit_force
 from controllers.state import HAND_POSITION, HAND_QUATERNION
-from experiments.certify.trial_simulation import trial_model
+from experiments.certify.trial_simulation import linkage_plant, trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
 from experiments.setups.modes.rivers import (
@@ -36,8 +36,7 @@ from experiments.setups.modes.rivers import (
 from experiments.setups.parts.defaults import river_gains
 from experiments.studies.field_figures import SPEED, straight_river
 from geometry.arrays import Array
-from models.phantom.spec import MOTOR_JOINTS
-from models.world.scene import PHANTOM, SceneConfig
+from models.world.scene import SceneConfig
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
 from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense
@@ -114,12 +113,8 @@ def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tupl
     data = mujoco.MjData(model)
     place_stylus(model, data, np.asarray(start, dtype=float))
     mujoco.mj_forward(model, data)
-    a, b, c = (int(model.joint(PHANTOM + name).dofadr[0]) for name in MOTOR_JOINTS)
-    plant = Plant(
-        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
-        ground=np.zeros(3), arm_v=(a, b, c), substeps=substeps, period=scene.servo_period,
-    )  # fmt: skip
     port = phantom_port(model, data, scene.servo_period, CUTOFF)
+    plant = linkage_plant(model, data, port, substeps)
     limiter = ForceLimiter(scene.servo_period)
     n = round(seconds / scene.servo_period)
     p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
