@@ -105,7 +105,7 @@ def _run_study(study: StudyConfig, executor: Threads, console: Console) -> tuple
     with tempfile.TemporaryDirectory() as folder, Database(Path(folder) / "s.sqlite", "cost", "cost", "") as database:
         begin = time.perf_counter()
         trials: tuple[Trial, ...] = plan_trials(study)
-        factors = {trial.key: {"user": trial.meeting.user} for trial in trials}
+        factors = {trial.key: {"user": trial.design.user} for trial in trials}
         run_missing(trials, database, executor, "", console, factors)
         return sum(row.seconds for row in database.rows()), time.perf_counter() - begin
 

@@ -64,13 +64,13 @@ def played(recording: Recording) -> tuple[Clip, ...]:
 
 
 def certify_clips(
-    clips: Sequence[Clip], judging: JudgementCriteria = DEFAULT_CRITERIA, size: float = 1.0
+    clips: Sequence[Clip], criteria: JudgementCriteria = DEFAULT_CRITERIA, size: float = 1.0
 ) -> dict[str, Verdict]:
     """Verdicts ``ballistic`` and ``turns`` on several clips: the worst of each kind, with a list of all clips.
 
     `size`: lengths of the figure relative to the default one, for which the clips are made [1].
     """
-    found = [(clip.name, clip_ballistics(similar(clip, size), judging).certificate.verdicts) for clip in clips]
+    found = [(clip.name, clip_ballistics(similar(clip, size), criteria).certificate.verdicts) for clip in clips]
     verdicts: dict[str, Verdict] = {}
     for kind in ("ballistic", "turns"):
         name, worst = min(

@@ -124,7 +124,7 @@ def _flatten(values: Mapping[str, object]) -> dict[str, object]:
 
 def certificate_inputs(
     config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip] = (),
-    judging: JudgementCriteria = DEFAULT_CRITERIA,
+    criteria: JudgementCriteria = DEFAULT_CRITERIA,
 ) -> dict[str, object]:  # fmt: skip
     """All data on which the verdicts on a run's field depend, by name, for `hash_of`.
 
@@ -140,7 +140,7 @@ def certificate_inputs(
         Largest force of the hand [N].
     clips : sequence of Clip
         Clips that are also judged; for a led figure, the clip that defines its gait.
-    judging : Judging
+    criteria : JudgementCriteria
         Tolerances by which clips are judged.
     """
     sampling, mode = certified_sampling(config, delay), config.mode
@@ -151,7 +151,7 @@ def certificate_inputs(
         "crossing": (mode.crossing, getattr(config.map, "reach", None)) if isinstance(mode, Rivers) else None,
         "curve": given_curves(config),
         "clips": [(clip.name, clip.fps, clip.poses) for clip in clips],
-        "judging": (judging, config.figure.stature),
+        "judging": (criteria, config.figure.stature),
         "figure": (config.figure.stature, config.figure.mass, mode.floor_scale) if isinstance(mode, Lead) else None,
         "period": sampling.period,
         "delay": sampling.delay,

@@ -113,8 +113,8 @@ def certify_rivers(
         found = _find_counterexample(field, rivers, places, push)
         sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
         others = [tuple(other for other in rivers if other is not river) for river in rivers]
-        keepings = [HandRetention(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
-        return verdicts | {"switching": switching(keepings, push, ceiling, found, common)}
+        retentions = [HandRetention(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
+        return verdicts | {"switching": switching(retentions, push, ceiling, found, common)}
     return verdicts | {"switching": _summed_verdict(common)}
 
 

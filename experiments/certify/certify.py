@@ -89,7 +89,7 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
 
 def certify_into(
     config: RunConfig, out: Path, delay: float = 0.0, hands: HandRange | None = None, push: float = 1.0,
-    clips: Sequence[Clip] = (), judging: JudgementCriteria = DEFAULT_CRITERIA,
+    clips: Sequence[Clip] = (), criteria: JudgementCriteria = DEFAULT_CRITERIA,
 ) -> Certificate:  # fmt: skip
     """Certify a run's field and clips, or return the certificate that the folder holds if it has the same inputs.
 
@@ -108,7 +108,7 @@ def certify_into(
         U_max, the hand's force in the bound on the distance [N].
     clips : sequence of Clip
         Clips whose flights are judged too; in the mode "lead" the figure walks with the first one.
-    judging : Judging
+    criteria : JudgementCriteria
         Tolerances of flights, and the floor's friction.
 
     Raises
@@ -117,13 +117,13 @@ def certify_into(
         If a number is out of its interval, or the curve is out of the workspace.
     """
     config, hands = resolved(config), hands or HandRange()
-    inputs = certificate_inputs(config, delay, hands, push, clips, judging)
+    inputs = certificate_inputs(config, delay, hands, push, clips, criteria)
     existing = _existing_certificate(out, inputs)
     if existing is not None:
         return existing
     main, verdicts = _field_verdicts(config, delay, hands, push, clips)
     if clips:
-        verdicts |= certify_clips(clips, judging, config.figure.stature / DEFAULT_STATURE)
+        verdicts |= certify_clips(clips, criteria, config.figure.stature / DEFAULT_STATURE)
     certificate = Certificate(verdicts, hash_of(inputs), hashes_of(inputs))
     plots: dict[str, tuple[Figure, str]] = {PLOT: (stability_figure(main, verdicts["stability"]), "stability boundary")}
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
@@ -133,7 +133,7 @@ def certify_into(
     return certificate
 
 
-def certify_clip_into(name: str, out: Path, judging: JudgementCriteria) -> Certificate:
+def certify_clip_into(name: str, out: Path, criteria: JudgementCriteria) -> Certificate:
     """Certify flights and turns of a clip, or return the certificate that the folder holds if it has the same inputs.
 
     Parameters
@@ -142,7 +142,7 @@ def certify_clip_into(name: str, out: Path, judging: JudgementCriteria) -> Certi
         An embedded clip, or a motion file.
     out : Path
         Folder to which ``certificate.json``, ``certificate.html`` and ``flights.png`` are written.
-    judging : Judging
+    criteria : JudgementCriteria
         Tolerances of flights, and the floor's friction.
 
     Raises
@@ -151,12 +151,12 @@ def certify_clip_into(name: str, out: Path, judging: JudgementCriteria) -> Certi
         If there is no such clip, or the file cannot be read.
     """
     (clip,), notes = load_clips([name], raw=True)
-    existing = _existing_certificate(out, clip_inputs(clip, judging))
+    existing = _existing_certificate(out, clip_inputs(clip, criteria))
     if existing is not None:
         return existing
     report = None if name in embedded_names() else load(Path(name)).report
     scaled = () if report is None else (f"lengths, and gravity with them, are scaled to the figure: {report.scaling}",)
-    found = clip_ballistics(clip, judging, (*scaled, *notes))
+    found = clip_ballistics(clip, criteria, (*scaled, *notes))
     _write_certificate(found.certificate, {FLIGHTS_PLOT: (flights_figure(found), "flights and admissible rates")}, out)
     return found.certificate
 

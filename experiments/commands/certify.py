@@ -96,8 +96,8 @@ class Command:
         if self.no_hand:
             _refuse_options(hand, "--no-hand", "a hand on the stylus")
         if self.clip is None and self.run is None and not depends_on_clips(config_of_options(self.options)):
-            judging = fields(self.tolerance)
-            judged = [f"tolerance.{f.name}" for f in judging if getattr(self.tolerance, f.name) != f.default]
+            criteria = fields(self.tolerance)
+            judged = [f"tolerance.{f.name}" for f in criteria if getattr(self.tolerance, f.name) != f.default]
             _refuse_options(
                 [*judged, *["friction"] * (self.friction != JudgementCriteria.friction)], "a field alone", "clips"
             )
@@ -105,7 +105,7 @@ class Command:
     def _hand_range(self) -> HandRange:
         return NO_HANDS if self.no_hand else self.hand
 
-    def _judging(self) -> JudgementCriteria:
+    def _criteria(self) -> JudgementCriteria:
         return JudgementCriteria(self.tolerance, self.friction)
 
     def _config_and_clips(self) -> tuple[RunConfig, tuple[Clip, ...]]:
@@ -133,11 +133,11 @@ class Command:
                 ) from None
         with working("certifying" if self.clip is None else "certifying a clip"):
             if self.clip is not None:
-                certificate = certify_clip_into(self.clip, folder, self._judging())
+                certificate = certify_clip_into(self.clip, folder, self._criteria())
             else:
                 config, clips = self._config_and_clips()
                 certificate = certify_into(
-                    config, folder, self.delay, self._hand_range(), self.hand_push, clips, self._judging()
+                    config, folder, self.delay, self._hand_range(), self.hand_push, clips, self._criteria()
                 )
         options = replace(self, out=None, overwrite=False, json=False)
         (folder / COMMAND_FILE).write_bytes(TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True))
@@ -160,8 +160,8 @@ class Command:
         if self.clip is not None:
             from experiments.setups.parts.clips import load_clips
 
-            inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._judging())
+            inputs = clip_inputs(load_clips([self.clip], raw=True)[0][0], self._criteria())
         else:
             config, clips = self._config_and_clips()
-            inputs = certificate_inputs(config, self.delay, self._hand_range(), self.hand_push, clips, self._judging())
+            inputs = certificate_inputs(config, self.delay, self._hand_range(), self.hand_push, clips, self._criteria())
         return verify_certificate(file, inputs)

@@ -11,9 +11,9 @@ from models.mocap.motion.clip import Clip
 from sim.compilation.sources import sources_hash
 
 
-def clip_inputs(clip: Clip, judging: JudgementCriteria) -> dict[str, object]:
+def clip_inputs(clip: Clip, criteria: JudgementCriteria) -> dict[str, object]:
     """All inputs of the verdicts on a clip, by name, for `hash_of`."""
-    return {"clip": (clip.fps, clip.poses), "judging": judging, "code": code_inputs()}
+    return {"clip": (clip.fps, clip.poses), "judging": criteria, "code": code_inputs()}
 
 
 def code_inputs() -> str:

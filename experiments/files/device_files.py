@@ -52,7 +52,7 @@ def identified_json(
 
     Parameters
     ----------
-    found : Identified
+    found : IdentificationResult
         Identified parameters; the offsets are relative to those of `base`, which the readings had already subtracted.
     recordings : sequence of str
         Recordings from which they were identified.

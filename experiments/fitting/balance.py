@@ -132,7 +132,10 @@ def _lap_dynamics(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -
 
 
 def _measured_laps(poses: Array, step: float, figure: mujoco.MjModel) -> Laps:
-    """Dynamics of laps of poses (k, n + 2, 75) a time `step` [s] apart, with one pose before and one after each lap."""
+    """Dynamics of laps of poses (k, n + 2, 75) a time `step` [s] apart, with one pose before and one after each lap.
+
+    Angular momenta are those of backward differences: the difference of two of them is centred, at the pose between.
+    """
     data = mujoco.MjData(figure)
     feet = [figure.geom(name).id for name in FOOT_CONTACTS]
     k, n = poses.shape[:2]

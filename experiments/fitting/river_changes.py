@@ -22,6 +22,7 @@ from experiments.fitting.figure_legs import packed_legs
 from geometry import quaternions
 from geometry.arrays import Array
 from geometry.easing import smooth_step
+from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.feasible import Feasible, contact_forces, feasible
 from models.mocap.preparation.stances import Stances, stances
@@ -47,6 +48,7 @@ _TIMEOUT = 8.0  # [s] after which a change that has not happened is given up
 _SAMPLES = 840  # of a round: divisible by any number of strides up to `_MAX_STRIDES`
 _MAX_ROW_STEP = 1.0  # [rad] between rows, five times the largest of captures: no spline follows larger steps
 _STRIDE_TOLERANCE = 0.02  # [rad], [m] within which strides of one clip count as equal
+_ROW_SHAPE = (-1, N_TANGENT)  # of a cached change: any number of rows
 
 
 class _Passage(NamedTuple):
@@ -121,7 +123,7 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
         gates += [
             _Gate(first, second, k, strides, span * (k + np.arange(_N_MOMENTS) / _N_MOMENTS)) for k in range(parts)
         ]
-    missing = [gate for gate in gates if not is_cached(results_folder(__name__), gate.name, made_of, (-1, 57))]
+    missing = [gate for gate in gates if not is_cached(results_folder(__name__), gate.name, made_of, _ROW_SHAPE)]
     if missing:
         with working("making rivers' changes feasible", len(missing)):
             run_in_workers([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
@@ -142,7 +144,7 @@ def _cached_change(
     def find() -> Array:
         return _change(made, blend, figure, gate.first, gate.second, gate.moments)
 
-    return cached_array(results_folder(__name__), gate.name, made_of, (-1, 57), find)
+    return cached_array(results_folder(__name__), gate.name, made_of, _ROW_SHAPE, find)
 
 
 def _stride_count(made: RiverClips, first: int, second: int) -> int:
@@ -179,9 +181,8 @@ def _make_passage(
     """The transition from one river's clip to another's at or soon after a moment of the round [s]; None if none."""
     curve, period = made.curves[first], made.round_seconds(first)
     lap = curve.duration
-    times = (
-        period + moment - _TIME_BEFORE - _CONTEXT - _SETTLING + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
-    )
+    begin = period + moment - _TIME_BEFORE - _CONTEXT - _SETTLING
+    times = begin + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
     stylus = stylus_path(curve.point(curve.start + times % lap))
     traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
     traces[:, TRACE_RIVER] = np.where(times < period + moment, first, second)
@@ -209,7 +210,7 @@ def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, 
     longest = MAX_CHANGE_FRACTION * made.round_seconds(first)
     usable = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not usable:
-        return np.zeros((0, 57))
+        return np.zeros((0, N_TANGENT))
     usable.sort(key=lambda passage: contact_forces(passage.clip(), passage.stances(), passage=True).residual)
     candidates: list[tuple[_Passage, Feasible]] = []
     for passage in usable[:_MAX_TRIES]:
@@ -225,8 +226,8 @@ def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, 
     left = np.arange(len(offsets))[::-1] / (0.5 * _TIME_AFTER * FPS)
     offsets *= np.array([smooth_step.py_func(x) for x in left])[:, None]
     if np.abs(np.diff(offsets, axis=0)).max() > _MAX_ROW_STEP:
-        return np.zeros((0, 57))
-    return np.vstack([np.full((1, 57), best.gate), offsets])
+        return np.zeros((0, N_TANGENT))
+    return np.vstack([np.full((1, N_TANGENT), best.gate), offsets])
 
 
 def _pose_offsets(second: Array, shown: Array) -> Array:

@@ -20,7 +20,7 @@ _DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and 
 _DURATION = _DWELL_TIME * len(_ORDER)
 
 
-def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
+def tour_clip(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     """The animation of a hand that moves at the rivers' pace and makes each change between two of the rivers once."""
     # The stylus filter begins at rest: its first second is dropped.
     times = np.arange(round((_DURATION + 2.0) * FPS)) / FPS - 1.0
@@ -38,7 +38,7 @@ def toured(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     return Clip(poses[times >= 0.0], FPS, "rivers")
 
 
-def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
+def tour_remarks(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
     """Remark on a map of three rivers, if the physical figure does not follow it; needs compiled code.
 
     Parameters
@@ -53,7 +53,7 @@ def not_followed(made: RiverClips, names: Sequence[str], part: Figure, figure: m
         Model of the figure alone.
     """
     made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
-    verdict = Trial(__name__, lambda: toured(made, part, figure), _DURATION, made_of).verdict()
+    verdict = Trial(__name__, lambda: tour_clip(made, part, figure), _DURATION, made_of).verdict()
     if verdict.bearable:
         return ()
     stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0

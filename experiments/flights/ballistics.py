@@ -138,7 +138,7 @@ def _is_in_first_lap(start: int, clip: Clip, supported: Mask) -> bool:
 
 
 def clip_ballistics(
-    clip: Clip, judging: JudgementCriteria = DEFAULT_CRITERIA, assumptions: tuple[str, ...] = ()
+    clip: Clip, criteria: JudgementCriteria = DEFAULT_CRITERIA, assumptions: tuple[str, ...] = ()
 ) -> ClipBallistics:
     """Certify the flights of a clip, and that friction suffices for its turns outside flights.
 
@@ -147,15 +147,15 @@ def clip_ballistics(
     laps = _with_second_lap(clip)
     floor = contacts(laps)
     motion = BodyMotion(laps.fps, *momentum(laps), floor.clearance, floor.supported)
-    judgements = judge_flights(motion, judging.tolerance)
+    judgements = judge_flights(motion, criteria.tolerance)
     flights = tuple(flight for flight in judgements if _is_in_first_lap(flight.fit.start, clip, motion.supported))
-    bounds = rate_bounds(motion, flights, judging.friction)
-    doubts, measures = contact_doubts(body_contact(laps), motion.com, laps.fps, judging.contact)
-    verdict = ballistic_verdict(motion, flights, judging.tolerance, doubts, measures)
+    bounds = rate_bounds(motion, flights, criteria.friction)
+    doubts, measures = contact_doubts(body_contact(laps), motion.com, laps.fps, criteria.contact)
+    verdict = ballistic_verdict(motion, flights, criteria.tolerance, doubts, measures)
     if verdict.verdict == "refuted":
         verdict = _with_initial_state(verdict, laps, flights)
     verdict = replace(verdict, assumptions=(*verdict.assumptions, *assumptions))
-    turns, inputs = turns_verdict(motion, flights, judging.friction, clip.n_frames), clip_inputs(clip, judging)
+    turns, inputs = turns_verdict(motion, flights, criteria.friction, clip.n_frames), clip_inputs(clip, criteria)
     certificate = Certificate({"ballistic": verdict, "turns": turns}, hash_of(inputs), hashes_of(inputs))
     lap = slice(0, clip.n_frames)
     return ClipBallistics(

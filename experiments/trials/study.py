@@ -215,7 +215,7 @@ class Study:
 
     def _margins(self, trials: Sequence[Trial]) -> dict[int, float]:
         """Share of the stability margin that each condition uses, by number of the condition."""
-        one_each = {trial.meeting.number: trial.config for trial in trials}
+        one_each = {trial.design.number: trial.config for trial in trials}
         return {number: cached_stability(config).used for number, config in one_each.items()}
 
 

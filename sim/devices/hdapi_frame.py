@@ -93,7 +93,7 @@ class HdMemory(NamedTuple):
         The device's nominal force [N].
     numbers : IntArray
         See `N_CLOSING`.
-    sample, command : Locked
+    sample, command : LockedNumbers
         See `SAMPLE_POSITION`, `COMMAND_ENABLE`. The callback writes samples, the servo writes commands.
     force, heat : Array
         Owned by the callback: the force that it sends [N], and the motors' temperatures, shapes (3,) and (6,).

@@ -135,7 +135,7 @@ class Errors(NamedTuple):
         Contact forces along the pyramids' edges [N].
     residual : (m, 6) array
         Residual wrench about the centre of mass [N, N m].
-    demand : Demand
+    demand : RequiredWrench
         Inverse dynamics of the states.
     """
 

@@ -190,9 +190,9 @@ class HandRetention:
             return unbounded
         speed_error = speed + self.lag
         score = math.sqrt(speed_error**2 + sharing.cost(distance, river.width))
-        return Bounds(distance, speed, score, self._keeping_margin(distance, speed_error, score))
+        return Bounds(distance, speed, score, self._retention_margin(distance, speed_error, score))
 
-    def _keeping_margin(self, distance: float, speed_error: float, score: float) -> float:
+    def _retention_margin(self, distance: float, speed_error: float, score: float) -> float:
         """Distance of S from the values at which the river would lose the hand [m/s], for an error of at most E_s."""
         least = self.sharing.admission + self.sharing.hysteresis - score
         for other in self.rivals:
@@ -214,7 +214,7 @@ class HandRetention:
         return low
 
 
-def hysteresis_dwell(keepings: Sequence[HandRetention], push: float) -> float:
+def hysteresis_dwell(retentions: Sequence[HandRetention], push: float) -> float:
     r"""Lower bound [s] of the time between two changes, within `CORE` of a tube's radius of the curves.
 
     .. math:: \tau_d = \frac{h - 2 (\nu + c\,\delta)}{a + c\,|e|}, \qquad
@@ -226,9 +226,9 @@ def hysteresis_dwell(keepings: Sequence[HandRetention], push: float) -> float:
     position. A larger h admits faster hands, so the bound does not grow without limit. It is at least one period, since
     the field is evaluated once per period, and exactly one period for h ≤ 2(ν + c δ).
     """
-    dwell, period = math.inf, keepings[0].held.sampling.period
-    for keeping in keepings:
-        river, sharing = keeping.held, keeping.sharing
+    dwell, period = math.inf, retentions[0].held.sampling.period
+    for retention in retentions:
+        river, sharing = retention.held, retention.sharing
         linear = river.still()
         inertia = np.linalg.eigvalsh(linear.jacobian @ np.linalg.inv(linear.mass) @ linear.jacobian.transpose(0, 2, 1))
         speeds = np.linalg.norm(river.curve.velocity(river.phases()), axis=1)
@@ -238,14 +238,14 @@ def hysteresis_dwell(keepings: Sequence[HandRetention], push: float) -> float:
         friction = float(joints * np.linalg.norm(river.device.coulomb))
         force = push + friction + river.k_r * CORE * river.width + river.b_d * error
         by_place = error * river.k_r / river.b_d / float(speeds.min()) + _MAX_COST_SLOPE * sharing.sigma / river.width
-        rounding = keeping.noise + by_place * keeping.reading
+        rounding = retention.noise + by_place * retention.reading
         rate = float(inertia.max()) * force + by_place * error
         dwell = min(dwell, max(0.0, sharing.hysteresis - 2.0 * rounding) / rate)
     return max(period, dwell)
 
 
 def switching(
-    keepings: Sequence[HandRetention], push: float, ceiling: float, found: Mapping[str, object], common: Common | None
+    retentions: Sequence[HandRetention], push: float, ceiling: float, found: Mapping[str, object], common: Common | None
 ) -> Verdict:
     """Verdict on the switching of a bundle's rivers, for hands that push with at most `push` newtons.
 
@@ -254,7 +254,7 @@ def switching(
 
     Parameters
     ----------
-    keepings : sequence of Keeping
+    retentions : sequence of HandRetention
         One for each river.
     push, ceiling : float
         U_max, and the largest force that is examined [N].
@@ -263,18 +263,18 @@ def switching(
     common : Common, optional
         Common Lyapunov function of the rivers and of no river, for a hand on the stylus where rivers meet.
     """
-    sharing = keepings[0].sharing
-    allowed = min((keeping.allowed(ceiling) for keeping in keepings), default=-1.0)
-    bounds = [keeping.bounds(push) for keeping in keepings]
-    rivals = [other for keeping in keepings for other in keeping.rivals]
+    sharing = retentions[0].sharing
+    allowed = min((retention.allowed(ceiling) for retention in retentions), default=-1.0)
+    bounds = [retention.bounds(push) for retention in retentions]
+    rivals = [other for retention in retentions for other in retention.rivals]
     least = min((float(r.least[r.distance < 2.0 * r.width].min(initial=math.inf)) for r in rivals), default=math.inf)
     figures: dict[str, object] = {
         "push_allowed": allowed,
         "score_bound": max(bound.score for bound in bounds),
         "distance_bound": max(bound.distance for bound in bounds),
-        "velocity_noise": max(keeping.noise for keeping in keepings),
+        "velocity_noise": max(retention.noise for retention in retentions),
         "hysteresis": sharing.hysteresis,
-        "hysteresis_dwell": hysteresis_dwell(keepings, push),
+        "hysteresis_dwell": hysteresis_dwell(retentions, push),
         "least_mismatch": least,
         "rival_weight": math.exp(-0.5 * (least / sharing.sigma) ** 2),
         "common_rate": None if common is None else common.rate,

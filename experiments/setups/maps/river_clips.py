@@ -15,7 +15,7 @@ from experiments.fitting.blendable import closed_loops, keep_own_pace, largest_p
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
-from experiments.fitting.river_tour import not_followed
+from experiments.fitting.river_tour import tour_remarks
 from experiments.setups.maps.about_circle import about_circle, motions_of, place_of
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
@@ -50,7 +50,7 @@ def river_clips_setup(
         if config.figure.kind != "physical" or same(clips):
             return ready, ()
         changing = with_changes(ready, config.figure.blend, figure)
-        return changing, not_followed(changing, names, config.figure, figure)
+        return changing, tour_remarks(changing, names, config.figure, figure)
 
     remark = f"a round of the clips takes {laps} laps of the hand, so that each keeps its speed"
     return replace(parts.with_remarks((remark,)) if laps > 1 else parts, plays_rivers=True, refined=refined)

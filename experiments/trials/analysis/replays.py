@@ -33,11 +33,11 @@ def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay
     shown: list[Replay] = []
     for rank, row in chosen_trials(frame, measure).items():
         trial, value = trials[row], float(frame[measure].iloc[row])
-        meeting = trial.meeting
-        levels = ", ".join(f"{factor} {level}" for factor, level in meeting.condition.levels.items())
+        design = trial.design
+        levels = ", ".join(f"{factor} {level}" for factor, level in design.condition.levels.items())
         title = (
-            f"The {rank} trial by {MEASURES[measure].label}, {value:.3g}: user {meeting.user}, {levels}, repetition "
-            f"{meeting.repetition + 1}"
+            f"The {rank} trial by {MEASURES[measure].label}, {value:.3g}: user {design.user}, {levels}, repetition "
+            f"{design.repetition + 1}"
         )
         shown.append(Replay(title, _replay_page(trial)))
     return tuple(shown)

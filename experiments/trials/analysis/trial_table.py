@@ -43,14 +43,14 @@ def trial_table(
         raise StudyError(f"{len(missing)} of {len(trials)} trials have not run yet; start the study again to go on")
     records: list[dict[str, object]] = []
     for trial in trials:
-        meeting, row = trial.meeting, rows[trial.key]
+        design, row = trial.design, rows[trial.key]
         values = {name: row.measures.get(name, float("nan")) for name in measures}
         if row.state == "done":
             values |= {
-                name: margins.get(meeting.number, float("nan")) for name in CONDITION_MEASURES if name in measures
+                name: margins.get(design.number, float("nan")) for name in CONDITION_MEASURES if name in measures
             }
-        record: dict[str, object] = {"key": trial.key, "user": meeting.user, **meeting.condition.levels}
-        record |= {"repetition": meeting.repetition, "position": meeting.position, "seed": trial.config.seed}
+        record: dict[str, object] = {"key": trial.key, "user": design.user, **design.condition.levels}
+        record |= {"repetition": design.repetition, "position": design.position, "seed": trial.config.seed}
         record |= {"state": row.state, "reason": row.reason, **values}
         records.append(record)
     return pd.DataFrame.from_records(records)

@@ -36,14 +36,14 @@ class Trial(NamedTuple):
     ----------
     key : str
         Hash of configuration, seed, files and code.
-    meeting : Meeting
+    design : DesignTrial
         User, condition and position in the design.
     config : RunConfig
         Configuration of the run.
     """
 
     key: str
-    meeting: DesignTrial
+    design: DesignTrial
     config: RunConfig
 
 
@@ -59,14 +59,14 @@ def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
     bases = {number: _base_config(study, people[0], condition) for number, condition in enumerate(conditions(study))}
     _check_distinct(study, bases)
     trials: list[Trial] = []
-    for meeting in design_trials(study):
-        base = bases[meeting.number]
-        user = replace(base.user, person=people[meeting.user])
+    for design in design_trials(study):
+        base = bases[design.number]
+        user = replace(base.user, person=people[design.user])
         # Independent of other trials' seeds, and of the numbers of users and repetitions.
-        entropy = (study.seed, meeting.user, meeting.number, meeting.repetition)
+        entropy = (study.seed, design.user, design.number, design.repetition)
         seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint32)[0])
         config = replace(base, user=user, seed=seed)
-        trials.append(Trial(trial_key(config), meeting, config))
+        trials.append(Trial(trial_key(config), design, config))
     return tuple(trials)
 
 

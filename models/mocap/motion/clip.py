@@ -10,7 +10,7 @@ import numpy.typing as npt
 from geometry import quaternions
 from geometry.arrays import Array
 from models.errors import ModelError
-from models.humanoid.skeleton import N_POSE, Pose
+from models.humanoid.skeleton import N_POSE, N_TANGENT, Pose
 
 CLOSURE_TOLERANCE = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
@@ -160,7 +160,7 @@ class Clip:
         Open clips have one-sided differences at their ends; a clip that closes is continued periodically.
         """
         if self.n_frames < 2:
-            return np.zeros((1, 57))
+            return np.zeros((1, N_TANGENT))
         steps = pose_difference(self.poses[:-1], self.poses[1:]) * self.fps
         before, after = np.vstack((steps[:1], steps)), np.vstack((steps, steps[-1:]))
         if self.closes():

@@ -7,7 +7,7 @@ squares of
   wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
 - the displacement of standing contact spheres from their places (foot skate), with a weight that fades out beside the
   stance, and the depth of the others below the floor;
-- the excess over joint limits (its cost is linear) and the torques of the legs beyond three quarters of their limits;
+- the excess over joint limits (its cost is linear) and joint torques beyond three quarters of their limits;
 - the change itself, and its third derivative.
 
 Feet are planted together with the dynamics: planting them by inverse kinematics alone made tracking worse.
@@ -30,7 +30,7 @@ from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
 
 JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
-_STRAIN_THRESHOLD = 0.75  # fraction of the legs' torque limits beyond which torque is penalised
+_STRAIN_THRESHOLD = 0.75  # fraction of the torque limits beyond which torque is penalised
 # Spacing of knots and of sampled instants [s]. With 80 and 20 ms preparation takes half the time, but the figure falls
 # in a run.
 _KNOT_SPACING, _INSTANT_SPACING = 0.05, 0.0125
@@ -45,7 +45,7 @@ _LINEAR_EXCESS = 0.05
 _MIN_DECREASE_RATIO = 0.25
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
-_TORQUE_END, _WRENCH_END = 51, 57  # ends of the first blocks of errors: torques, wrench
+_TORQUE_END, _WRENCH_END = 3 * len(JOINTS), 3 * len(JOINTS) + 6  # ends of the first blocks of errors: torques, wrench
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class FeasibleWeights:
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     strain : float
-        Excess of a leg torque over three quarters of its limit, as a fraction of the limit.
+        Excess of a joint torque over three quarters of its limit, as a fraction of the limit.
     place, root, spine, head, arm, leg, ankle : float
         Change of the root's position [1/m], and of rotations [1/rad].
     sway, jerk : float
@@ -225,8 +225,8 @@ class _Problem:
             else:
                 break
             # g·step is the decrease that the linearisation predicts; where contacts change, it holds only nearby.
-            predicted = costs[-1] - cost > _MIN_DECREASE_RATIO * (g @ step)
-            damping = max(damping / 8.0, 1e-8) if predicted else max(8.0 * damping, 1e-4)
+            is_near_linear = costs[-1] - cost > _MIN_DECREASE_RATIO * (g @ step)
+            damping = max(damping / 8.0, 1e-8) if is_near_linear else max(8.0 * damping, 1e-4)
             x = x - step
             costs.append(cost)
             if len(costs) > _CONVERGENCE_STEPS and costs[-1 - _CONVERGENCE_STEPS] - cost < _COST_TOLERANCE * cost:
@@ -280,7 +280,7 @@ class _Problem:
         depth = (
             w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance[instants], 0.0) * ~grounded
         )
-        vectors = vectors_in_ranges(state.q[:, 7:].reshape(m, 17, 4), self.low, self.high)
+        vectors = vectors_in_ranges(state.q[:, 7:].reshape(m, -1, 4), self.low, self.high)
         excess = vectors - np.clip(vectors, self.low, self.high)
         magnitude = np.maximum(np.abs(excess), _LINEAR_EXCESS)
         # The penalty's square is 2 e |excess| - e² beyond e = _LINEAR_EXCESS.
@@ -288,7 +288,7 @@ class _Problem:
         penalty = excess / magnitude * penalty_root
         torque_ratio = demand.torque_on(grip) / torque_limit()
         strain = torque_ratio - np.clip(torque_ratio, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)
-        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, 51)]
+        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, -1)]
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
             return _Errors(weighted, None, residual, grip, torque_ratio)
@@ -299,7 +299,7 @@ class _Problem:
         jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * dynamics.spheres[:, :, 2]
         slope = w.limit * _LINEAR_EXCESS / penalty_root * (excess != 0)
         rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
-        for joint in range(17):
+        for joint in range(len(JOINTS)):
             axes = slice(3 * joint, 3 * joint + 3)
             jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = rates[:, joint]
         return _Errors(weighted, jacobian, residual, grip, torque_ratio)

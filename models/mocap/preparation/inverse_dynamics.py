@@ -32,7 +32,7 @@ class InverseDynamics:
 
     Attributes
     ----------
-    demand : Demand
+    demand : RequiredWrench
         Wrench that contact forces must produce, and the geometry of the contacts.
     wrench : array, shape (m, 3, 6, 57)
         Derivatives of the wrench about the centre of mass by position, velocity, acceleration.

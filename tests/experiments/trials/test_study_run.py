@@ -77,7 +77,7 @@ def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
     study = small_study(factors=factors, users={"number": 2})
     trials = study.trials
     rows = [perform_trial(Task(trial.key, to_json(trial.config)), MapCache()) for trial in trials]
-    states = {trial.meeting.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
+    states = {trial.design.condition.levels["around"]: row.state for trial, row in zip(trials, rows, strict=True)}
     assert states == {"near": "done", "far": "failed"}
     assert all("reach" in row.reason or "stops" in row.reason for row in rows if row.state == "failed")
 
@@ -85,7 +85,7 @@ def test_failing_trial_is_a_row_with_its_reason(tmp_path: Path) -> None:
 def test_measures_of_tracing_and_exaggerating_tasks() -> None:
     task = {"trace": {"user": "trace"}, "exaggerate": {"user": "exaggerate"}}
     study = small_study(factors={"task": task}, users={"number": 1}, run={"figure": "kinematic"}, measures=[])
-    rows = {t.meeting.condition.levels["task"]: perform_trial(Task(t.key, to_json(t.config))) for t in study.trials}
+    rows = {t.design.condition.levels["task"]: perform_trial(Task(t.key, to_json(t.config))) for t in study.trials}
     assert {row.state for row in rows.values()} == {"done"}
     for task, nothing, something in (
         ("trace", "expressiveness", "tracking_error"),

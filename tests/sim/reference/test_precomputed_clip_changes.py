@@ -169,7 +169,7 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
     from experiments.config.run_config import Figure
 
     monkeypatch.setattr(Trial, "verdict", lambda _: verdict)
-    assert river_tour.not_followed(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
+    assert river_tour.tour_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
 
 
 @pytest.fixture(scope="module")
@@ -232,9 +232,9 @@ def test_figure_follows_all_changes_between_three_clips_better_than_offsets() ->
     }
     seconds = river_tour._DURATION
     by_offsets, by_changes = (
-        followed(river_tour.toured(haptic_map, Figure(), FIGURE), seconds) for haptic_map in (map_with_offsets, found)
+        followed(river_tour.tour_clip(made, Figure(), FIGURE), seconds) for made in (map_with_offsets, found)
     )
     # Measured: 4 and 16 %.
     assert by_changes.fell is None
     assert by_changes.residual < min(0.08, 0.5 * by_offsets.residual)
-    assert isinstance(river_tour.toured(found, Figure(), FIGURE), Clip)
+    assert isinstance(river_tour.tour_clip(found, Figure(), FIGURE), Clip)

@@ -34,7 +34,7 @@ def _rivers(field, clock=CLOCK):
     return certified_bundle(field.bundle, phantom_device(), clock)
 
 
-def _both_keepings(field, clock=CLOCK):
+def _both_retentions(field, clock=CLOCK):
     sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
     first, second = _rivers(field, clock)
     return [HandRetention(first, (second,), sharing), HandRetention(second, (first,), sharing)]
@@ -103,12 +103,12 @@ def test_no_common_function_for_a_hand_without_stiffness():
 
 def test_wide_hysteresis_at_a_shallow_crossing_is_certified_and_mujoco_keeps_the_hand():
     field = straight_pair(10.0, "discrete", 2.0, 8.0)
-    keepings = _both_keepings(field, SLOW_FILTER)
-    verdict = switching(keepings, 0.1, 5.0, {}, None)
+    retentions = _both_retentions(field, SLOW_FILTER)
+    verdict = switching(retentions, 0.1, 5.0, {}, None)
     assert verdict.verdict == "certified"
     assert verdict.margin == pytest.approx(verdict.figures["push_allowed"] - 0.1)
-    allowed, river = verdict.figures["push_allowed"], keepings[0].held
-    bounds = keepings[0].bounds(0.99 * allowed)
+    allowed, river = verdict.figures["push_allowed"], retentions[0].held
+    bounds = retentions[0].bounds(0.99 * allowed)
     for direction in np.concatenate([np.eye(3), -np.eye(3)]):
         push = Push(tuple(0.99 * allowed * direction), 0.3, 0.5)
         course = simulated_course(field, SLOW_FILTER, river.curve.point(0.2), river.curve.velocity(0.2), 1.2, push)
@@ -118,7 +118,7 @@ def test_wide_hysteresis_at_a_shallow_crossing_is_certified_and_mujoco_keeps_the
 
 def test_narrow_hysteresis_is_unknown_when_rounding_exceeds_it():
     field = straight_pair(10.0, "discrete", 0.15)
-    verdict = switching(_both_keepings(field), 0.0, 5.0, {}, None)
+    verdict = switching(_both_retentions(field), 0.0, 5.0, {}, None)
     assert verdict.verdict == "unknown"
     assert verdict.figures["velocity_noise"] > field.hysteresis  # rounding alone outweighs it
 
@@ -127,7 +127,7 @@ def test_hand_between_shallow_rivers_chatters_without_hysteresis():
     field = straight_pair(10.0, "discrete", 0.0)
     found = _found_counterexample(field, CLOCK, 0.0)
     assert found["kind"] == "chatters"
-    assert switching(_both_keepings(field), 0.0, 5.0, found, None).verdict == "refuted"
+    assert switching(_both_retentions(field), 0.0, 5.0, found, None).verdict == "refuted"
     course = _simulated_counterexample(field, CLOCK, found)
     assert failure(course.river, CLOCK.period, found["river"], True).kind == "chatters"
     # From the same start it does not chatter with the certified hysteresis.
@@ -164,11 +164,11 @@ def test_smooth_form_throws_the_hand_out_at_a_shallow_crossing():
     field = straight_pair(30.0, "smooth", 0.15)
     found = _found_counterexample(field, CLOCK, 0.0)
     assert found
-    verdict = switching(_both_keepings(field), 0.0, 5.0, found, None)
+    verdict = switching(_both_retentions(field), 0.0, 5.0, found, None)
     assert verdict.verdict == "refuted"
     # The mismatch tolerance leaves the rival most of its weight here and none at a right angle.
     assert verdict.figures["rival_weight"] > 0.5
-    steep = switching(_both_keepings(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
+    steep = switching(_both_retentions(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
     assert steep.figures["rival_weight"] < 1e-6
     course = _simulated_counterexample(field, CLOCK, found)
     assert failure(course.river, CLOCK.period, found["river"], False, smooth=True) is not None
@@ -176,26 +176,26 @@ def test_smooth_form_throws_the_hand_out_at_a_shallow_crossing():
 
 def test_dwell_time_falls_with_push_and_is_one_period_without_hysteresis():
     slow = Sampling(2e-5, 0.0, 2.0)
-    without, narrow = (_both_keepings(straight_pair(45.0, "discrete", h), slow) for h in (0.0, 0.5))
+    without, narrow = (_both_retentions(straight_pair(45.0, "discrete", h), slow) for h in (0.0, 0.5))
     assert hysteresis_dwell(without, 0.2) == slow.period
     assert hysteresis_dwell(narrow, 0.2) > hysteresis_dwell(narrow, 5.0) > slow.period
     # With the sampling of a run the hand can be accelerated through the hysteresis within one tick.
-    assert hysteresis_dwell(_both_keepings(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
+    assert hysteresis_dwell(_both_retentions(straight_pair(45.0, "discrete", 0.15)), 0.2) == CLOCK.period
 
 
 def test_lag_of_selection_velocity_stays_within_its_bound():
     lap, look, radius = 4.0, 8e-3, 0.0477
     sharing = SelectionRule(0.09, 0.01, 0.01, "discrete", look)
     bundle = RiverBundle((River(Trajectory.circle(radius, lap), 0.02, 0.02, 8.0),), ("circle",))
-    keeping = HandRetention(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
+    retention = HandRetention(certified_bundle(bundle, phantom_device(), SLOW_FILTER)[0], (), sharing)
     angle = 2.0 * np.pi / lap * CLOCK.period * np.arange(2000)
     velocity = 2.0 * np.pi / lap * radius * np.stack((-np.sin(angle), np.cos(angle)), axis=1)
     filtered = lfilter([share := -np.expm1(-CLOCK.period / look)], [1.0, share - 1.0], velocity, axis=0)
     lag = np.linalg.norm(filtered - velocity, axis=1)[1000:].max()
-    assert 0.9 * keeping.lag < lag < keeping.lag
-    without = replace(keeping, sharing=replace(sharing, look=0.0))
-    assert keeping.bounds(0.05).score > without.bounds(0.05).score
-    assert keeping.bounds(0.05).speed == without.bounds(0.05).speed
+    assert 0.9 * retention.lag < lag < retention.lag
+    without = replace(retention, sharing=replace(sharing, look=0.0))
+    assert retention.bounds(0.05).score > without.bounds(0.05).score
+    assert retention.bounds(0.05).speed == without.bounds(0.05).speed
 
 
 def test_failure_distinguishes_taken_over_thrown_out_and_chatters():
