@@ -17,7 +17,7 @@ from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.bodies import body_of, figure_period
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.devices import DeviceOf, device_of
-from experiments.setups.parts.eyes import POSES, with_eyes
+from experiments.setups.parts.eyes import N_POSES, with_eyes
 from experiments.setups.parts.hands import Beginning, beginning
 from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import MapParts, Parts, Settings
@@ -127,7 +127,7 @@ def wire_parts(
     parts = draft if refined is maps else parts_of(refined)
     servo = _make_servo(parts, world, device).linked(parts.program)
     if parts.user.wishes is not None and world.has_figure and parts.walking is None:
-        phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, POSES, endpoint=False)
+        phases = np.linspace(parts.maps.curve.start, parts.maps.curve.end, N_POSES, endpoint=False)
         servo = with_eyes(servo, parts.user.wishes, parts.maps.curve.point(phases))
     _set_start_state(parts, servo, world)
     return Session(parts, world, servo, parts.maps.remarks + parts.remarks)

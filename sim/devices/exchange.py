@@ -14,7 +14,7 @@ from numba import njit
 from controllers.safety.faults import FAULT_CODE, HELD, elapsed, judge_reading
 from controllers.state import HAND_QUATERNION, HAND_SIZE, HAND_TIME
 from geometry.arrays import Array
-from sim.world.encoders import MEMORY_SIZE, SILENT_PERIODS, motor_torques, plausibility, take_reading
+from sim.world.encoders import ANGLES, MEMORY_SIZE, SILENT_PERIODS, motor_torques, plausibility, take_reading
 from sim.world.phantom_port import velocity_smoothing
 from sim.world.plant import Plant, step
 from sim.world.shown_phantom import ShownPhantom, show_angles, shown_phantom
@@ -125,10 +125,10 @@ def actuate_exchange(device: Exchange, force: Array) -> None:
 @njit
 def advance_exchange(device: Exchange, plant: Plant, t: float, replay: bool, applied: Array) -> None:
     """Show the linkage in the device's configuration, and step the physics of the figure."""
-    m, g = device.memory, device.gimbal
+    theta, g = device.memory[ANGLES : ANGLES + 3], device.gimbal
     if not replay:
         applied[:] = 0.0
-    show_angles(device.shown, (m[0], m[1], m[2]), (g[0], g[1], g[2]))
+    show_angles(device.shown, (theta[0], theta[1], theta[2]), (g[0], g[1], g[2]))
     step(plant)
 
 

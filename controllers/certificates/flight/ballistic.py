@@ -16,7 +16,6 @@ import numpy as np
 from controllers.certificates.flight.flight_fit import (
     MIN_FLIGHT_DURATION,
     FlightFit,
-    Mask,
     find_flights,
     fit_flight,
     fit_free_fall,
@@ -25,9 +24,11 @@ from controllers.certificates.flight.flight_fit import (
 from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.certificates.report import Outcome, Verdict
 from controllers.errors import ParameterError
-from geometry.arrays import Array
+from geometry.arrays import Array, Mask
 from geometry.physics import GRAVITY
 
+# A turn about the vertical that begins and ends in the air, over the largest deviation in it from constant momentum.
+_TURN_RATIO = 9.4
 _MIN_GRAVITY_RATIO = 0.12  # of g: a slower fall, to be played at over 2.9 times its speed, is hardly a slowed recording
 
 
@@ -157,14 +158,14 @@ def ballistic_verdict(
     The counterexample of a refuted motion is the best take-off of its first refuted flight: the position and velocity
     with which free fall stays nearest to the recorded centre of mass, and its largest ``distance`` from it [m].
     """
+    unnoticed = _TURN_RATIO * np.rad2deg(tolerance.yaw)
     assumptions = (
         f"gravity is {GRAVITY} m/s², without drag, on the figure's own size and mass",
         f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
         "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
         "flights are what contacts of feet, hands and other parts leave, of five frames and "
         f"{MIN_FLIGHT_DURATION} s or more",
-        f"a turn about the vertical of up to {9.4 * np.rad2deg(tolerance.yaw):.0f}° that begins and ends in the air "
-        "is not noticed",
+        f"a turn about the vertical of up to {unnoticed:.0f}° that begins and ends in the air is not noticed",
     )
     figures: dict[str, object] = {**(measures or {})}
     doubt_text = "; ".join(doubts)

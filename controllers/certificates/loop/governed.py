@@ -27,7 +27,7 @@ from controllers.curves.trajectory import piece_velocity
 
 # Number of frequencies of G, from 1e-4 of the Nyquist frequency up to it; eight times as many lower the largest drag
 # by 0.02 %.
-FREQUENCIES = 400
+N_FREQUENCIES = 400
 
 
 def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
@@ -44,7 +44,7 @@ def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
 
 
 def response_along(loop: SampledLoop, k_r: float, b_d: float) -> npt.NDArray[np.complex128]:
-    """G(e^{iω}) [m/(N s)] from a force along the curve to the measured speed, complex, shape (n, `FREQUENCIES`)."""
+    """G(e^{iω}) [m/(N s)] from a force along the curve to the measured speed, complex, shape (n, `N_FREQUENCIES`)."""
     linear, (basis, projection) = loop.linear, loop.across
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     force = projection @ loop.fresh @ (linear.jacobian.transpose(0, 2, 1) @ tangent[:, :, None])
@@ -52,7 +52,7 @@ def response_along(loop: SampledLoop, k_r: float, b_d: float) -> npt.NDArray[np.
     # In diagonal form, one eigenvalue problem per phase serves all frequencies.
     values, vectors = np.linalg.eig(loop.frozen(k_r, b_d))
     residues = (speed @ vectors)[:, 0, :] * np.linalg.solve(vectors, force.astype(complex))[:, :, 0]
-    z = np.exp(1j * np.geomspace(1e-4 * np.pi, np.pi, FREQUENCIES))
+    z = np.exp(1j * np.geomspace(1e-4 * np.pi, np.pi, N_FREQUENCIES))
     return np.sum(residues[:, None, :] / (z[None, :, None] - values[:, None, :]), axis=2)
 
 

@@ -20,9 +20,9 @@ from controllers.certificates.loop.stability import River, counterexample
 from controllers.certificates.report import Verdict
 from geometry.arrays import Array
 
-DIRECTIONS = 24  # directions across the curve, over half a turn; half or four times as many need the same damping
+N_DIRECTIONS = 24  # directions across the curve, over half a turn; half or four times as many need the same damping
 # Number of frequencies up to the Nyquist frequency, where most damping is needed; a quarter as many give the same.
-FREQUENCIES = 4000
+N_FREQUENCIES = 4000
 
 
 def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]:
@@ -33,7 +33,7 @@ def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]
     """
     tangent = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     plane = np.linalg.svd(tangent[:, None, :])[2][:, 1:, :]
-    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angle = np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     directions = circle @ plane
     joints = joint_motion(linear.jacobian[:, None], directions)
@@ -48,7 +48,7 @@ def damping_needed(k: float, b: float, sampling: Sampling) -> tuple[float, float
     The impedance is the servo's: backward difference, first-order low-pass, delay rounded up to whole periods.
     """
     period, keep = sampling.period, sampling.keep
-    angle = np.pi * (np.arange(FREQUENCIES) + 1.0) / FREQUENCIES
+    angle = np.pi * (np.arange(N_FREQUENCIES) + 1.0) / N_FREQUENCIES
     unit_delay = np.exp(-1j * angle)
     delay = unit_delay ** (sampling.whole_delay + (sampling.rest_delay > 0.0))
     impedance = delay * (k + b * (1.0 - keep) / (1.0 - keep * unit_delay) * (1.0 - unit_delay) / period)

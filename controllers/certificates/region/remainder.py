@@ -22,7 +22,9 @@ from geometry.arrays import Array
 # Factor for terms of second order in T. From 5 mm off the demo's curve a hand comes within 1.8 mm, with 1.1 too; with
 # 1 it comes within 1.65 mm.
 SECOND_ORDER_FACTOR = 1.05
-DENSE = 120  # masses at which terms that are not convex in the mass are evaluated; half or twice certifies the same
+_GRID_FACTOR = 1.01  # for extrema of the curve between the phases of its grid
+_MAX_CURVED_DISTANCE = 0.7  # distance from the curve over its radius of curvature up to which the bounds are finite
+N_MASSES = 120  # masses at which terms that are not convex in the mass are evaluated; half or twice certifies the same
 
 
 class Course(NamedTuple):
@@ -47,10 +49,10 @@ class Course(NamedTuple):
         speed, size = np.linalg.norm(velocity, axis=1), np.linalg.norm(acceleration, axis=1)
         cosine = np.abs(np.einsum("ni,ni->n", velocity, acceleration)) / np.maximum(speed * size, 1e-300)
         bend = size * np.sqrt(np.maximum(0.0, 1.0 - cosine**2)) / speed**2
-        moving = 1.01 * law.carries
+        moving = _GRID_FACTOR * law.carries
         return Course(
-            moving * float(speed.max()), float(speed.min()), 1.01 * float(bend.max()), moving * float(size.max()),
-            float(cosine.max()), 1.01 * law.parallel * float((bend * speed).max()),
+            moving * float(speed.max()), float(speed.min()), _GRID_FACTOR * float(bend.max()),
+            moving * float(size.max()), float(cosine.max()), _GRID_FACTOR * law.parallel * float((bend * speed).max()),
         )  # fmt: skip
 
 
@@ -115,12 +117,12 @@ def remainder(
     overshoot = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
     speed = pace + overshoot * v * level
     curved_distance = course.curvature * e * level
-    if curved_distance >= 0.7:
+    if curved_distance >= _MAX_CURVED_DISTANCE:
         return Remainder(np.inf, np.inf, np.inf, np.inf, np.inf, e, v, force)
     bend = course.curvature / (1.0 - curved_distance)
 
     # Terms that are not convex in μ, on a dense grid of masses with the corners of the other parameters.
-    z = cell.corners(DENSE)
+    z = cell.corners(N_MASSES)
     dense = np.array([form.numbers(row) for row in z])
     back = np.linalg.inv(dense)
     lever = cell.lever(z[:, 0])

@@ -15,7 +15,7 @@ from sim.reference.reference import poses_along
 from sim.users.person.eye import Eye
 from sim.users.person.wishes import ENGAGED, PLACE, Wishes
 
-POSES = 128  # poses along a motion: some 3 degrees of a lap apart
+N_POSES = 128  # poses along a motion: some 3 degrees of a lap apart
 _DIFFERENCE_STEP = 2e-3  # [m] step of the stylus for finite differences of the figure's pose
 # Damping of the inverse over the largest singular value: weaker effects are felt rather than seen.
 _DAMPING_RATIO = 0.15
@@ -38,7 +38,7 @@ def with_eyes(servo: Servo, wishes: Wishes, curve: Array) -> Servo:
     if wishes.period > 0.0 and wishes.lap > 0.0:
         rows = rows[: round(wishes.lap / wishes.period)]
     places = rows if wishes.period >= 0.0 and len(rows) > 1 else curve
-    places = places[np.linspace(0.0, len(places) - 1.0, min(POSES, len(places))).astype(int)]
+    places = places[np.linspace(0.0, len(places) - 1.0, min(N_POSES, len(places))).astype(int)]
     hand = servo.device.user
     person = hand.person._replace(eye=learned_eye(servo, places))
     return servo._replace(device=servo.device._replace(user=hand._replace(person=person)))

@@ -20,7 +20,7 @@ from geometry.arrays import Array, IntArray
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 
-# Τ [s], r [m]. Half or twice r changes no loop of 19 captures. τ matters: half the value loops two of them differently
+# [s] τ, [m] r: half or twice r changes no loop of 19 captures. τ matters: half the value loops two of them differently
 # and moves the ends of five others; twice leaves a run and a skip open, and closes another run by half strides.
 _TIME_SCALE, _LENGTH_SCALE = 0.1, 0.5
 _MIN_LAP_DURATION = 0.4  # least duration of a lap [s]: a sprinter's stride takes 0.44; half changes none of 17 captures
