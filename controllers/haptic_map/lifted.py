@@ -12,7 +12,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.lifted_kernel import clip_weights, lifted_map, packed_lifted, with_legs_of
-from controllers.haptic_map.lifting.frames import CLOSES, PlacedClip, checked_angles, closing_gap
+from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
 from controllers.haptic_map.map_stages import CompiledMap
@@ -233,7 +233,7 @@ def _place_clip(name: str, clip: tuple[Array, float], closed: bool, angles: Arra
     poses = checked_clip(*clip, f"clip {name}")
     checked = checked_angles(angles, len(poses), closed, f"clip {name}")
     gap = closing_gap(poses) if closed else 0.0
-    if gap > CLOSES:
+    if gap > MAX_CLOSURE_GAP:
         raise ParameterError(
             f"clip {name} is to be closed, but its last frame is {gap:.3g} from its first one moved over the ground; "
             "give it as open, or cut it where it repeats"

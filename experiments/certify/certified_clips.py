@@ -11,7 +11,7 @@ from experiments.config.run_config import RunConfig
 from experiments.files.map_files import load_figure_map
 from experiments.flights.ballistics import clip_ballistics
 from experiments.results.folder import RECORDING, clips_of, config_of, has_animation
-from experiments.results.measures.run_measures import SETTLING
+from experiments.results.measures.run_measures import SETTLING_TIME
 from experiments.setups.setups import clips_for
 from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.motion.clip import Clip
@@ -58,7 +58,7 @@ def played(recording: Recording) -> tuple[Clip, ...]:
     if not has_animation(recording):
         return ()
     rate = recording.rates["frames"]
-    stride, first, last = max(1, round(rate / _FPS)), round(SETTLING * rate), round(_MAX_DURATION * rate)
+    stride, first, last = max(1, round(rate / _FPS)), round(SETTLING_TIME * rate), round(_MAX_DURATION * rate)
     poses = recording.channel("frames", "reference")[first:last:stride]
     return (Clip(poses, rate / stride, PLAYED),) if len(poses) > 1 else ()
 

@@ -7,7 +7,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import stylus_path
-from experiments.fitting.verdict import FPS, SECONDS
+from experiments.fitting.verdict import FPS, TRIAL_SECONDS
 from geometry.arrays import Array
 from geometry.easing import cubic_steps
 from models.mocap.motion.clip import Clip
@@ -16,7 +16,7 @@ from sim.reference.reference import map_poses
 _DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
 _PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
 _PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
-_TIMES = np.arange(round((SECONDS + 1.0) * FPS)) / FPS
+_TIMES = np.arange(round((TRIAL_SECONDS + 1.0) * FPS)) / FPS
 
 
 def domain(made: Cylindrical | Composite) -> Array:
@@ -37,7 +37,7 @@ def tour_of_domain(made: Cylindrical | Composite, lap: float, parallel: bool) ->
     so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
     (`Follow.parallel`) its angular speed does not change.
     """
-    turn, pushed = 2.0 * np.pi * _TIMES / SECONDS, _DOMAIN_FRACTION * _push_profile(_TIMES)
+    turn, pushed = 2.0 * np.pi * _TIMES / TRIAL_SECONDS, _DOMAIN_FRACTION * _push_profile(_TIMES)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = domain(made).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]

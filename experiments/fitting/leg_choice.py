@@ -24,7 +24,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.fitting.hand_tours import domain, tour_along_curve, tour_of_domain
-from experiments.fitting.verdict import SECONDS, Trial, Verdict
+from experiments.fitting.verdict import TRIAL_SECONDS, Trial, Verdict
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
 _SHARES = (1.0, 0.5, 0.25, 0.0)  # λ of `with_share`, in the order in which they are tried
@@ -37,7 +37,7 @@ Carrying = TypeVar("Carrying", Cylindrical, Composite)
 def trial_of(made: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
     """The trial in which the physical figure follows a map about a circle for 20 s."""
     made_of = (made.compiled().params, np.array([lap, parallel, *domain(made).ravel()]))
-    return Trial(__name__, lambda: tour_of_domain(made, lap, parallel), SECONDS, made_of)
+    return Trial(__name__, lambda: tour_of_domain(made, lap, parallel), TRIAL_SECONDS, made_of)
 
 
 def single_clip_remarks(made: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ def followed_map(
 
     def trial_of(part: Lifted) -> Trial:
         made_of = part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
-        return Trial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), SECONDS, made_of)
+        return Trial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), TRIAL_SECONDS, made_of)
 
     whole = trial_of(made).verdict()
     sound = not whole.bearable or trial_of(made).is_sound()

@@ -22,7 +22,7 @@ MAX_FOOT_SKATE = 0.02
 # Largest floor penetration [m], the bound of docs/validation/blended-motions.md, and largest excess of a joint [rad].
 MAX_PENETRATION, MAX_JOINT_EXCESS = 0.01, np.deg2rad(5.0)
 
-SECONDS, FPS = 20.0, 120.0
+TRIAL_SECONDS, FPS = 20.0, 120.0
 """Duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
 
 

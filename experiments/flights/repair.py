@@ -22,7 +22,7 @@ from models.mocap.motion.clip import Clip
 from models.mocap.readers.own_bvh import write_bvh
 from sim.body.clip_motion import clip_motion
 
-ROUNDS = 4  # iterations, since momentum by finite differences also depends on the rotations of neighbouring frames
+N_ITERATIONS = 4  # momentum by finite differences also depends on the rotations of neighbouring frames
 
 
 def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
@@ -31,7 +31,7 @@ def with_constant_momentum(clip: Clip, flights: list[tuple[int, int]]) -> Clip:
     A flight for which there is no solution is left as it is.
     """
     poses = clip.poses.copy()
-    for _ in range(ROUNDS):
+    for _ in range(N_ITERATIONS):
         dynamics = momentum(Clip(poses, clip.fps, clip.name))
         for start, end in flights:
             rotations = _flight_rotations(dynamics, start, end, 1.0 / clip.fps)

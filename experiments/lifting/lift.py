@@ -20,7 +20,7 @@ from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import MapTransition
 from controllers.motion.loops import append_reversal, checked_clip
 from experiments.fitting.figure_legs import figure_legs
-from experiments.lifting.map_quality import SAMPLES, Layout, body_weights, lap_times
+from experiments.lifting.map_quality import N_SAMPLES, Layout, body_weights, lap_times
 from experiments.setups.parts.clips import load_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
@@ -69,7 +69,7 @@ class LiftedClips:
 
     def layout(self) -> Layout:
         """The places of the clips in the map, for `measure_map`."""
-        steps = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+        steps = 2.0 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
         sites = np.stack([self.haptic_map.site(i, steps) for i in range(len(self.clips))], axis=1)
         times = [lap_times(angles, clip.duration) for angles, clip in zip(self.lifting.angles, self.clips, strict=True)]
         return Layout(self.haptic_map, self.names, sites, np.stack(times, axis=1))

@@ -60,7 +60,7 @@ def measure_motion(clip: Clip) -> MotionMeasure:
     )
 
 
-SAMPLES = 96  # samples of the lap
+N_SAMPLES = 96  # samples of the lap
 _PROBE_COUNT = 400  # random places at which smoothness is measured
 _STEP = 1e-5  # [m] step of the differences of h_*
 _FPS = 60.0  # frame rate of in-betweens [1/s]
@@ -154,7 +154,7 @@ def measure_map(layout: Layout, clips: tuple[Clip, ...], rng: np.random.Generato
     scale = np.concatenate([np.ones(3), np.repeat(body_weights(), 3)])[:, None]
     pairs, sites, n = layout.neighbours(), layout.sites, len(layout.names)
     distance = [np.linalg.norm(sites[:, i] - sites[:, j], axis=1).min() for i, j in combinations(range(n), 2)]
-    angles = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    angles = 2.0 * np.pi * np.arange(N_SAMPLES) / N_SAMPLES
     along = [_condition_numbers(layout, scale, angles, sites[:, i]) for i in range(n)]
     halfway = [_condition_numbers(layout, scale, angles, 0.5 * (sites[:, i] + sites[:, j])) for i, j in pairs]
     return MapQuality(
@@ -193,9 +193,9 @@ def _roughness(
     changes: list[float] = []
     for _ in range(_PROBE_COUNT):
         i, j = pairs[int(rng.integers(len(pairs)))]
-        row, share = int(rng.integers(SAMPLES)), float(rng.uniform())
+        row, share = int(rng.integers(N_SAMPLES)), float(rng.uniform())
         place = (1.0 - share) * layout.sites[row, i] + share * layout.sites[row, j]
-        x = _stylus_pose(2.0 * np.pi * row / SAMPLES, place)
+        x = _stylus_pose(2.0 * np.pi * row / N_SAMPLES, place)
         step = np.concatenate([rng.normal(size=3), np.zeros(4)])
         step *= _STEP / np.linalg.norm(step)
         here, there = (scale * layout.haptic_map.jacobian(x + side * step)[:, :3] for side in (-0.5, 0.5))
@@ -208,13 +208,13 @@ def in_between(layout: Layout, i: int, j: int) -> Clip:
     lap = 0.5 * (layout.times[:, i] + layout.times[:, j])
     frames = max(8, round(float(lap[-1]) * _FPS))
     # The end point is left out: it is the first frame of the next lap.
-    samples = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(SAMPLES + 1))
+    samples = np.interp(np.linspace(0.0, lap[-1], frames, endpoint=False), lap, np.arange(N_SAMPLES + 1))
     closed = np.concatenate([layout.sites, layout.sites[:1]])
     middle = 0.5 * (closed[:, i] + closed[:, j])
-    places = np.stack([np.interp(samples, np.arange(SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
+    places = np.stack([np.interp(samples, np.arange(N_SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
     memory = layout.haptic_map.compiled().memory
     poses = [
-        layout.haptic_map.pose(_stylus_pose(2.0 * np.pi * row / SAMPLES, place), memory)
+        layout.haptic_map.pose(_stylus_pose(2.0 * np.pi * row / N_SAMPLES, place), memory)
         for row, place in zip(samples, places, strict=True)
     ]
     return Clip(np.array(poses), frames / float(lap[-1]), f"{layout.names[i]}-{layout.names[j]}")
@@ -226,7 +226,7 @@ def lap_times(angles: Array, duration: float) -> Array:
     Where the clip leaves a gap in the lap, time is linear in θ.
     """
     share = np.linspace(0.0, 1.0, len(angles))
-    step = 2.0 * np.pi * np.arange(SAMPLES + 1) / SAMPLES
+    step = 2.0 * np.pi * np.arange(N_SAMPLES + 1) / N_SAMPLES
     lap = duration * 2.0 * np.pi / (angles[-1] - angles[0])
     # Two laps, since the first frame may be at any angle.
     knots = np.concatenate([angles - 2.0 * np.pi, angles])

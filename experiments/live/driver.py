@@ -2,7 +2,7 @@
 
 import time
 
-IDLE = 10.0  # [s] without an action after which another browser may take over
+MAX_IDLE_TIME = 10.0  # [s] without an action after which another browser may take over
 
 
 class Driver:
@@ -27,8 +27,9 @@ class Driver:
         return True
 
     def take_over(self, client: int | None) -> bool:
-        """Let another browser drive, if the driver has been idle for `IDLE`; returns whether it drives now."""
-        if self._client is not None and client != self._client and time.monotonic() - self._last_action_time < IDLE:
+        """Let another browser drive, if the driver has been idle for `MAX_IDLE_TIME`; returns whether it drives now."""
+        is_active = time.monotonic() - self._last_action_time < MAX_IDLE_TIME
+        if self._client is not None and client != self._client and is_active:
             return False
         self._client, self._last_action_time = client, time.monotonic()
         return True

@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.render.graphics import Canvas, Image, View, offscreen_backend
 from experiments.render.scenes import Stage, Workspace
-from experiments.render.shown_world import SHADOW_REACH, STAGE, ShownWorld, shown_world
+from experiments.render.shown_world import SHADOW_REACH, STAGE_GROUP, ShownWorld, shown_world
 from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
 from geometry.arrays import Array
@@ -18,11 +18,11 @@ from sim.errors import SimError
 from sim.recording.recording import Recording
 
 WIDTH, HEIGHT, FPS = 1440, 600, 30.0
-FINER = 3  # supersampling factor of rows and columns
+SUPERSAMPLING = 3  # supersampling factor of rows and columns
 DEVICE_REACH = 0.8  # half-width of the region that casts shadows on the device [m]
 DEVICE_SHARE = 0.34  # share of the width for the device
-MOMENTS = 4  # poses of the figure, evenly spaced over the second half of the run
-SPACING = 1.1  # distance between them [m]
+N_POSES = 4  # poses of the figure, evenly spaced over the second half of the run
+POSE_SPACING = 1.1  # distance between them [m]
 GHOST_AT = np.array([-0.95, 0.45])  # position of the ghost relative to the figure: behind, and to its left [m]
 _VIEW = View((-0.2, 0.15, 0.8), 6.5, 180.0, -9.0)
 
@@ -41,17 +41,17 @@ def draw_picture(folder: Path, target: Path, overwrite: bool) -> None:
     if target.exists() and not overwrite:
         raise SimError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
     with Recording(folder / RECORDING) as recording:
-        world = shown_world(recording, FINER * WIDTH, FINER * HEIGHT)
+        world = shown_world(recording, SUPERSAMPLING * WIDTH, SUPERSAMPLING * HEIGHT)
         moments = timeline(recording, folder, world, FPS, 0.0, None, "default")
         left, backend = round(DEVICE_SHARE * WIDTH) if world.has_figure else WIDTH, offscreen_backend()
         with Canvas(world.model, backend, 20_000, DEVICE_REACH) as canvas:
-            picture = _draw_device(recording, world, moments, canvas, FINER * left)
+            picture = _draw_device(recording, world, moments, canvas, SUPERSAMPLING * left)
         if world.has_figure:
             with Canvas(world.model, backend, 20_000, SHADOW_REACH) as canvas:
-                figures = _draw_figures(recording, world, moments, canvas, FINER * (WIDTH - left))
+                figures = _draw_figures(recording, world, moments, canvas, SUPERSAMPLING * (WIDTH - left))
             picture = np.hstack((picture, figures))
     # Supersampling: each pixel is the mean of several, which smooths edges of shadows and limbs.
-    pixels = picture.reshape(HEIGHT, FINER, WIDTH, FINER, 3).mean(axis=(1, 3))
+    pixels = picture.reshape(HEIGHT, SUPERSAMPLING, WIDTH, SUPERSAMPLING, 3).mean(axis=(1, 3))
     matplotlib.image.imsave(target, np.rint(pixels).astype(np.uint8))
 
 
@@ -60,26 +60,26 @@ def _draw_device(recording: Recording, world: ShownWorld, moments: Timeline, can
     user = recording.channel("ticks", "user")
     row = int(np.argmax([np.linalg.norm(user[int(tick)][1:]) for tick in moments.ticks]))
     Stage(recording, world, moments, "front", 1.0).put(row)
-    return Workspace(recording, world, moments).picture(canvas, row, width, FINER * HEIGHT)
+    return Workspace(recording, world, moments).picture(canvas, row, width, SUPERSAMPLING * HEIGHT)
 
 
 def _draw_figures(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:
     """Poses side by side, turned to the camera together with their ghosts."""
     qpos, at = recording.channel("frames", "qpos"), world.figure_at
-    n, half_width = len(moments.t), 0.5 * (MOMENTS - 1) * SPACING
-    for k, row in enumerate(np.linspace(n // 2, n - 1, MOMENTS).astype(int)):
+    n, half_width = len(moments.t), 0.5 * (N_POSES - 1) * POSE_SPACING
+    for k, row in enumerate(np.linspace(n // 2, n - 1, N_POSES).astype(int)):
         state = qpos[int(moments.frames[row])].copy()
-        pose, position = state[at : at + N_POSE].copy(), np.array([0.0, half_width - k * SPACING])
+        pose, position = state[at : at + N_POSE].copy(), np.array([0.0, half_width - k * POSE_SPACING])
         ghost = None if moments.ghost is None else moments.ghost[row]
         state[at : at + N_POSE] = _displacement_to(pose, position).moved(pose)
         if ghost is not None:
             ghost = _displacement_to(ghost, position + GHOST_AT).moved(ghost)
         world.put(state, ghost)
         if k == 0:
-            canvas.look(world.data, _VIEW, STAGE)
+            canvas.look(world.data, _VIEW, STAGE_GROUP)
         else:
             canvas.add(world.data)
-    return canvas.picture(width, FINER * HEIGHT)
+    return canvas.picture(width, SUPERSAMPLING * HEIGHT)
 
 
 def _displacement_to(pose: Array, position: Array) -> PlanarDisplacement:

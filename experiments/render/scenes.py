@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from experiments.render.graphics import Canvas, Image, View
-from experiments.render.shown_world import BENCH, GHOST, STAGE, ShownWorld, mixed_with_white
+from experiments.render.shown_world import BENCH_GROUP, GHOST, STAGE_GROUP, ShownWorld, mixed_with_white
 from experiments.render.timeline import Timeline
 from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
@@ -74,7 +74,7 @@ GHOST_SPACING = 0.95  # distance of the ghost from the figure, to the side [m]
 GHOST_DEPTH = 0.35  # and away from the camera [m]
 FRAME_SCALE = 1.1  # size of the picture relative to its required contents
 ARM_REACH = 0.45  # smallest visible distance to either side of a root [m]
-LEGEND = 0.1  # room for the legend at the bottom [m]
+LEGEND_HEIGHT = 0.1  # room for the legend at the bottom [m]
 ARROW_LENGTH = 0.06  # drawn length of a large force [m]
 TRAIL_SECONDS = 0.6  # [s] of the stylus's path that are drawn behind it
 MIN_ARROW_LENGTH = 0.004  # shortest arrow that is drawn [m]
@@ -112,7 +112,7 @@ class Workspace:
 
     def picture(self, canvas: Canvas, row: int, width: int, height: int) -> Image:
         """Draw a moment; the world has been put there."""
-        canvas.look(self._world.data, self._view, BENCH)
+        canvas.look(self._world.data, self._view, BENCH_GROUP)
         tick = int(self._moments.ticks[row])
         trail = self._p_WH + self._p[max(0, tick - self._trail) : tick + 1 : max(1, self._trail // 30)]
         for start, end in itertools.pairwise(trail):
@@ -164,7 +164,7 @@ class Stage:
 
     def picture(self, canvas: Canvas, row: int, width: int, height: int) -> Image:
         """Draw a moment; the world has been put there."""
-        canvas.look(self.world.data, self._view(row), STAGE)
+        canvas.look(self.world.data, self._view(row), STAGE_GROUP)
         return canvas.picture(width, height)
 
     def _view(self, row: int) -> View:
@@ -199,4 +199,4 @@ class Stage:
         top = float(np.max([cloud[:, 1].max() for cloud in points])) + 0.15
         half = FRAME_SCALE * max(0.5 * top, side / aspect)
         field = np.deg2rad(self.world.model.vis.global_.fovy)
-        return half / np.tan(0.5 * field) + 0.3, 0.5 * top - LEGEND
+        return half / np.tan(0.5 * field) + 0.3, 0.5 * top - LEGEND_HEIGHT

@@ -31,7 +31,7 @@ SHADOW_REACH = 5.5  # half-width of the shadow map [m]
 FIELD_OF_VIEW_DEG = 30.0  # vertical [degrees]: a ball at the upper edge is drawn 1/cos 15°, 4 % longer than wide
 _WOOD_COLOR = (0.8, 0.71, 0.6, 1.0)
 _FLOOR_BRIGHTNESS, _LINE_BRIGHTNESS = 0.97, 0.8  # brightness of the floor and of its lines
-STAGE, BENCH = 1, 2  # geom groups: figure, ghost or arm on the floor; the device with its curves
+STAGE_GROUP, BENCH_GROUP = 1, 2  # geom groups: figure, ghost or arm on the floor; the device with its curves
 
 
 @dataclass(frozen=True)
@@ -151,9 +151,9 @@ def _assign_groups(spec: mujoco.MjSpec) -> None:
     for geom in spec.geoms:
         name = geom.parent.name
         if geom.name == "floor" or name.startswith((FIGURE, GHOST, ROBOT)):
-            geom.group = geom.group if geom.group >= FIRST_HIDDEN_GROUP else STAGE
+            geom.group = geom.group if geom.group >= FIRST_HIDDEN_GROUP else STAGE_GROUP
         elif geom.group < FIRST_HIDDEN_GROUP:
-            geom.group = BENCH
+            geom.group = BENCH_GROUP
             if name == "world" and geom.type == mujoco.mjtGeom.mjGEOM_BOX:
                 geom.rgba = np.array(_WOOD_COLOR)
 

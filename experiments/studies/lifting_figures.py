@@ -11,7 +11,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifting.room import Room
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import LiftedClips, lift_clips
-from experiments.lifting.map_quality import SAMPLES, Layout, MapQuality, MotionMeasure, measure_map
+from experiments.lifting.map_quality import N_SAMPLES, Layout, MapQuality, MotionMeasure, measure_map
 from models.humanoid.skeleton import figure_model
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
 
@@ -24,9 +24,9 @@ def cylinder(lifted: LiftedClips, room: Room) -> Layout:
     motions = [(clip.poses, clip.fps) for clip in lifted.clips]
     haptic_map = Cylindrical(motions, room.r_range, room.z_range, figure_legs(figure_model()))
     corners = np.array([(r, z) for z in room.z_range for r in room.r_range])
-    share = np.arange(SAMPLES + 1)[:, None] / SAMPLES
+    share = np.arange(N_SAMPLES + 1)[:, None] / N_SAMPLES
     times = share * np.array([clip.duration for clip in lifted.clips])
-    return Layout(haptic_map, lifted.names, np.tile(corners, (SAMPLES, 1, 1)), times)
+    return Layout(haptic_map, lifted.names, np.tile(corners, (N_SAMPLES, 1, 1)), times)
 
 
 def comparison_table(lifted: MapQuality, hand_made: MapQuality) -> str:
@@ -67,7 +67,7 @@ def curves_figure(lifted: LiftedClips, hand_made: Layout) -> Figure:
         plane.plot(*(1e3 * hand_made.sites[0, i]), "s", color=colour, ms=5)
     plane.set(xlabel="r [mm]", ylabel="z [mm]", aspect="equal", title="lifted (lines), hand-made (squares)")
     plane.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
-    angle = 360.0 * np.arange(SAMPLES) / SAMPLES
+    angle = 360.0 * np.arange(N_SAMPLES) / N_SAMPLES
     for meeting in lifted.lifting.after.meetings:
         i, j = meeting.transition.first, meeting.transition.second
         apart = 1e3 * np.linalg.norm(layout.sites[:, i] - layout.sites[:, j], axis=1)

@@ -20,7 +20,7 @@ from controllers.fields.river import River
 from controllers.state import VELOCITY
 from experiments.config.options import run_config
 from experiments.results.pages.figures import STYLE
-from experiments.setups.modes.rivers import GATE, HYSTERESIS, SIGMA
+from experiments.setups.modes.rivers import GATE_ADMISSION, HYSTERESIS, SIGMA
 from experiments.setups.parts.governor import speeds_along
 from experiments.setups.parts.part_types import ClipMapParts
 from experiments.setups.session import Session
@@ -99,7 +99,8 @@ class LedBackflip:
         """The backflip's river, which takes a hand at the admissible speeds of its flight."""
         pace = self.curve.length / self.curve.duration
         bundle = RiverBundle((River(self.curve, TUBE, speeds=self.speeds),), ("backflip",))
-        return HigherOrder(bundle, GATE * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace, "discrete").program()
+        scale = (GATE_ADMISSION * pace, SIGMA["discrete"] * pace, HYSTERESIS * pace)
+        return HigherOrder(bundle, *scale, "discrete").program()
 
     def straight_path(self, speed: float) -> Array:
         """A straight path at a speed [m/s] that touches the curve in mid-flight, shape (n, 3) [m], `STEP` apart."""

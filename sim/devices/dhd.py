@@ -21,7 +21,7 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import items
 from sim.devices.driver import READ, DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
-from sim.devices.hid import WATCHDOG
+from sim.devices.hid_reports import WATCHDOG_TIME
 from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import place_stylus, pose_fault, tip_force
 from sim.errors import SimError
@@ -157,7 +157,7 @@ class DhdDevice:
         self._id = bytes([device])
         serial = ctypes.c_ushort(0)
         library.dhdGetSerialNumber(ctypes.byref(serial), self._id)
-        watchdog = library.dhdSetWatchdog(round(WATCHDOG / _WATCHDOG_UNIT), self._id) == 0
+        watchdog = library.dhdSetWatchdog(round(WATCHDOG_TIME / _WATCHDOG_UNIT), self._id) == 0
         name = (library.dhdGetSystemName(self._id) or b"").decode(errors="replace")
         self.identity = DeviceIdentity(name, "DHD", str(serial.value), "", True, watchdog, True, own_weight=True)
         self.telemetry = make_telemetry()

@@ -34,7 +34,7 @@ from sim.devices.hid_reports import (
     N_ENABLED,
     N_LAST,
     N_WATCHDOG,
-    WATCHDOG,
+    WATCHDOG_TIME,
     HidMemory,
     judge_report,
     make_command,
@@ -107,7 +107,7 @@ class HidPhantom:
             raise DriverFault(Fault.VERSION_WRONG, int(identity["major"]))
         self._identity_report, numbers = identity, self._hid.numbers
         numbers[N_BOOT] = int(identity["boot"])
-        numbers[N_WATCHDOG] = min(round(WATCHDOG * 1e6), int(identity["watchdog_max_us"]))
+        numbers[N_WATCHDOG] = min(round(WATCHDOG_TIME * 1e6), int(identity["watchdog_max_us"]))
         self._hid.peak[:] = identity["peak_torque"] * protocol.PEAK_UNIT
         self._capabilities = int(identity["capabilities"])
 

@@ -18,7 +18,7 @@ from sim.devices import hid_protocol as protocol
 from sim.devices.driver import LOST, READ, REFUSED, ROUND_TRIP, TEMPERATURE, note_arrival
 from sim.devices.exchange import READING_CLOCK, READING_SEQUENCE, READING_SIZE, READING_SWITCH, READING_THETA
 
-WATCHDOG = 0.01
+WATCHDOG_TIME = 0.01
 """Watchdog period: time without a command after which the firmware switches the motors off [s]. Twice the age at which
 a command becomes invalid on the host, so that the firmware acts only where the host failed to."""
 MAX_TEMPERATURE = 100.0
@@ -257,13 +257,13 @@ def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.in
     if enable_command < 0 or status & _STATUS_ENABLED:
         return
     if status & _STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
-        if made - io[IO_READING_TIME] > 0.5 * WATCHDOG:
+        if made - io[IO_READING_TIME] > 0.5 * WATCHDOG_TIME:
             hid.numbers[N_REENABLE] = 1
         else:
             _set_fault(io, _DEVICE_REPORTED, _STATUS_WATCHDOG)
         return
     waited = min(io[IO_NOW] - io[IO_ENABLE_TIME], made - io[IO_ENABLE_DEVICE_TIME])
-    if waited > WATCHDOG:
+    if waited > WATCHDOG_TIME:
         _set_fault(io, _MOTORS_OFF, waited)
 
 

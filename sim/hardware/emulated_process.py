@@ -29,7 +29,7 @@ from sim.hardware.process_start import parent_id
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
 
-WATCHDOG = 0.02
+WATCHDOG_TIME = 0.02
 """Time without a command after which the device switches its motors off [s]: twenty periods at 1 kHz."""
 _MOTORS_OFF_COMMAND = bytes(32)  # a command of zero torques with the motors off
 _SENDING_TIME, _PACKET_SIZE = READING_SIZE, READING_SIZE + 1  # in a reading's packet: index of the sending time; size
@@ -56,11 +56,11 @@ def host_device(make: Callable[[], EmulatedPhantom], end: EmulatedEnd, realtime:
     packet, shown, trip_count, is_silent = np.zeros(_PACKET_SIZE), np.zeros(SHOWN_SIZE), 0, True
     no_torque, last_command = np.zeros(3), np.zeros(4)
     while os.getppid() == parent:
-        command = _receive_command(end.packets, end.period if is_silent else WATCHDOG)
+        command = _receive_command(end.packets, end.period if is_silent else WATCHDOG_TIME)
         if command is None:
             if not is_silent:
                 trip_count += 1
-                for _ in range(round(WATCHDOG / end.period)):
+                for _ in range(round(WATCHDOG_TIME / end.period)):
                     device.write(last_command[:3], last_command[3] > 0.0)
             is_silent = True
             device.write(no_torque, False)

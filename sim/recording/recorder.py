@@ -30,7 +30,7 @@ from sim.recording.unclosed import lock_for_writing
 CHUNK_SECONDS = 0.5  # [s] of rows that a killed run can lose, besides rows not yet appended
 # A write is copied page by page, and a kill between two pages corrupts what crosses their boundary. With this page size
 # HDF5's own structures stay within a page (up to 8176 chunks, more than an hour); rows need not.
-PAGE = 4096
+PAGE_SIZE = 4096
 DISK_RESERVE = 4_000_000  # [bytes] kept free on the disk, for structures and summary of the file
 _PARTIAL_KEPT = "what was recorded until then is kept; expected room on the disk, or another --out"
 _PACKAGES = ("haptic-vector-fields", "mujoco", "numpy", "numba", "h5py")
@@ -205,7 +205,7 @@ class Recorder:
             raise RecordingError(f"{path}: exists; a recording is never overwritten, choose another name")
         temporary = path.with_name(f".{path.name}.{os.getpid()}")
         try:
-            with h5py.File(temporary, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE) as file:
+            with h5py.File(temporary, "w", libver="latest", fs_strategy="page", fs_page_size=PAGE_SIZE) as file:
                 _write_header(file, config, seed, static)
                 for name, group in groups.items():
                     _write_group(file.create_group(name), group)

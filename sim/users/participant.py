@@ -9,7 +9,7 @@ from sim.errors import SimError
 from sim.users.intents.own import Own
 from sim.users.person import person_state as at
 from sim.users.person.body import arm_matrices, check_steps
-from sim.users.person.eye import LOOKS, no_eye
+from sim.users.person.eye import IMAGE_INTERVAL, no_eye
 from sim.users.person.person import Person
 from sim.users.person.person_state import PersonState
 from sim.users.person.random_numbers import fresh_chance
@@ -84,7 +84,7 @@ class Participant:
             n[getattr(at, name.upper())] = getattr(person, name)
         n[at.PERIOD], n[at.WISH_PERIOD], n[at.LAP] = period, self.wishes.period, self.wishes.lap
         n[at.REFLEX_TICKS], n[at.SEEN_TICKS] = reflex, seen
-        n[at.LOOK_TICKS] = max(1, round(LOOKS / period))
+        n[at.LOOK_TICKS] = max(1, round(IMAGE_INTERVAL / period))
         n[at.TREMOR_A], n[at.TREMOR_B], n[at.TREMOR_GAIN] = tremor_filter(person, period)
         return n
 

@@ -5,7 +5,7 @@ import numpy as np
 from geometry.arrays import Array
 from sim.recording.recording import Channel
 
-TRAVEL = 1.5  # [m] a figure that leaves this radius is followed
+MAX_TRAVEL = 1.5  # [m] a figure that leaves this radius is followed
 
 
 def typical_peak(channel: Channel) -> float:
@@ -23,7 +23,7 @@ def view_offsets(roots: Array, fps: float) -> Array:
     fps : float
         Their rate [1/s].
     """
-    if np.max(np.linalg.norm(roots - roots[0], axis=1)) < TRAVEL:
+    if np.max(np.linalg.norm(roots - roots[0], axis=1)) < MAX_TRAVEL:
         return np.zeros_like(roots)
     window = int(fps) | 1
     padded = np.pad(roots, ((window // 2, window // 2), (0, 0)), mode="edge")

@@ -14,7 +14,7 @@ import viser
 from geometry.arrays import Array
 from models.world.scene import P_WH
 from sim.viewer.actor import GHOST, Actor
-from sim.viewer.framing import TRAVEL
+from sim.viewer.framing import MAX_TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, simplify_shapes, tube
 from sim.viewer.shown import Course, Moment
@@ -25,7 +25,7 @@ GHOST_AT = np.array([-0.75, 0.45, 0.0])  # [m] offset of the ghost from the figu
 METRES_PER_NEWTON = 0.12  # drawn length of a force
 LEAST_ARROW = 0.02  # [m] drawn length below which a force is hidden
 LONGEST_SLICE = 0.11  # [m] drawn length of the largest force of a field slice
-FOLLOWS = 0.5  # [s] time constant with which the view follows a travelling figure
+VIEW_TIME = 0.5  # [s] time constant with which the view follows a travelling figure
 FIGURE_CELL, GHOST_CELL, PHANTOM_CELL = 0.006, 0.012, 0.0012  # [m] mesh resolution, coarse enough for a phone
 RELOCATION_DISTANCE = 3.0  # [m] distance from the view's position beyond which a figure was relocated, not moved
 
@@ -159,9 +159,9 @@ class LiveStage:
             self._start = position.copy()
         displacement = position - self._start
         if np.linalg.norm(displacement - self._view_offset) > RELOCATION_DISTANCE:
-            self._view_offset = displacement if np.linalg.norm(displacement) > TRAVEL else np.zeros(2)
-        elif np.linalg.norm(displacement) > TRAVEL or np.any(self._view_offset != 0.0):
-            share = 1.0 - np.exp(-max(t - self._t, 0.0) / FOLLOWS)
+            self._view_offset = displacement if np.linalg.norm(displacement) > MAX_TRAVEL else np.zeros(2)
+        elif np.linalg.norm(displacement) > MAX_TRAVEL or np.any(self._view_offset != 0.0):
+            share = 1.0 - np.exp(-max(t - self._t, 0.0) / VIEW_TIME)
             self._view_offset = self._view_offset + share * (displacement - self._view_offset)
         self._t = t
         return np.array([*self._view_offset, 0.0])

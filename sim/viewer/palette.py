@@ -14,7 +14,7 @@ CURVE = "#3c465a"
 TUBE = "#4682c8"
 RIVERS = (TUBE, "#b5417a", "#8a6d1d", "#7a5fc0", "#1f8f98", "#a8453a", "#6b7280")  # of the first seven rivers
 
-PUSH = 0.2  # [N] force of the hand above which it counts as pushing
+MIN_PUSH_FORCE = 0.2  # [N] force of the hand above which it counts as pushing
 
 
 def rgb(color: str) -> tuple[int, int, int]:

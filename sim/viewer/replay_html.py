@@ -18,7 +18,7 @@ from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import typical_peak, view_offsets
-from sim.viewer.palette import FIELD, PUSH, USER, rgb
+from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER, rgb
 from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
 from sim.viewer.shown import Course, courses
 
@@ -185,7 +185,7 @@ class _Stage:
         is_distinct = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
         if np.count_nonzero(is_distinct) < 2:
             return
-        is_pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > PUSH
+        is_pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > MIN_PUSH_FORCE
         vertices, faces = tube(points[is_distinct], 0.007, sides=8)
         color = rgb(USER if is_pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)

@@ -10,12 +10,12 @@ import viser
 from geometry.arrays import Array
 
 FIELD_OF_VIEW = np.deg2rad(34.0)  # vertical [rad]: a ball at the upper edge is drawn 1/cos 17°, 5 % longer than wide
-PANEL = 335.0  # [px] width of viser's panel
-PHONE = 0.75  # width/height below which a window counts as a phone's, where the panel covers the lower part
-DESKTOP = 576.0, 720.0  # [px] a tall window between these widths is no phone's: below the first viser covers the lower
+PANEL_WIDTH = 335.0  # [px] width of viser's panel
+MAX_PHONE_RATIO = 0.75  # width/height below which a window counts as a phone's, where the panel covers the lower part
+DESKTOP_WIDTHS = 576.0, 720.0  # [px] a tall window between these is no phone's: below the first viser covers the lower
 # part, and phones, whose pixels are finer, report more than the second
 LEAST_FREE = 0.3  # smallest share of the width beside the panel: reached by windows below 479 px other than a phone's
-SHEET = 0.6  # share of the height that the panel covers on a phone
+SHEET_SHARE = 0.6  # share of the height that the panel covers on a phone
 DEFAULT_SIZE = 1400.0, 850.0  # [px] assumed size of a window that has not reported its own
 
 
@@ -47,9 +47,8 @@ def camera_of(view: View, width: float, height: float) -> Camera:
     With m metres per pixel in the plane of the view's centre, window height h and field of view α, its distance is
     m h/(2 tan(α/2)). It is shifted by half the part that the panel covers, so that the view is centred in the rest.
     """
-    free = (
-        (width, (1.0 - SHEET) * height) if is_phone(width, height) else (max(width - PANEL, LEAST_FREE * width), height)
-    )
+    beside = max(width - PANEL_WIDTH, LEAST_FREE * width), height
+    free = (width, (1.0 - SHEET_SHARE) * height) if is_phone(width, height) else beside
     metres = max(2.0 * half / pixels for half, pixels in zip(view.half, free, strict=True))
     side = np.array(view.side) / np.linalg.norm(view.side)
     right, up = screen_axes(-side)
@@ -138,4 +137,4 @@ def _is_placed_for(camera: viser.CameraHandle, view: View, sizes: Iterable[tuple
 
 def is_phone(width: float, height: float) -> bool:
     """Whether a window of a given size [px] is as narrow as a phone's."""
-    return width < PHONE * height and not DESKTOP[0] < width < DESKTOP[1]
+    return width < MAX_PHONE_RATIO * height and not DESKTOP_WIDTHS[0] < width < DESKTOP_WIDTHS[1]

@@ -106,7 +106,7 @@ def test_stepping_run_returns_along_a_wider_s_curve(tmp_path: Path, monkeypatch:
         pytest.skip("the motion capture data is not beside the project")
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
     for module in (lead, leading_hand):
-        monkeypatch.setattr(module, "BEND", 0.4 * np.pi)
+        monkeypatch.setattr(module, "HALF_TURN", 0.4 * np.pi)
     clip = str(MOCAP / "deepmimic/humanoid3d_run.txt")
     run(run_config(mode="lead", clips=(clip,), seconds=19.0), tmp_path / "run", False, 0.0)
     assert_led_back(json.loads((tmp_path / "run" / "summary.json").read_text()))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
+from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, closing_gap
 from controllers.haptic_map.lifting.room import Room
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
@@ -31,7 +31,7 @@ def lifted(clips):
     lap, k = np.arange(64)[:, None] * TURN / 64, np.arange(m)
     r, z = 0.036 + 0.012 * (k % side), -0.012 + 0.012 * (k // side)
     sites = np.stack([r + 2e-3 * np.sin(lap + k), z + 2e-3 * np.cos(2.0 * lap + k)], axis=-1)
-    closed = [clip.n_frames >= 4 and closing_gap(clip.poses) <= CLOSES for clip in clips]
+    closed = [clip.n_frames >= 4 and closing_gap(clip.poses) <= MAX_CLOSURE_GAP for clip in clips]
     angles = []
     for i, (clip, closes) in enumerate(zip(clips, closed, strict=True)):
         s = np.linspace(0.0, 1.0, clip.n_frames)

@@ -10,7 +10,7 @@ import pytest
 from experiments.config.options import run_config
 from experiments.live.cap_hand import CapHand
 from experiments.live.gate import Gate
-from experiments.live.panels.clock_panel import STEP
+from experiments.live.panels.clock_panel import KEY_STEP
 from experiments.live.session.desk import MAX_UPLOAD_BYTES
 from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse
@@ -104,8 +104,8 @@ def test_keys_move_and_release_the_hand(tab: Any, served: ServedPage) -> None:
     place = served.settled()["p"].copy()
     for key in "LLLUU":
         tab.keyboard.press(key.lower())
-    served.assert_until(lambda: desk.holds and desk.target[2] > place[2] + 1.5 * STEP, "the keys have arrived")
-    np.testing.assert_allclose(desk.target - place, [3 * STEP, 0.0, 2 * STEP], atol=1e-9)
+    served.assert_until(lambda: desk.holds and desk.target[2] > place[2] + 1.5 * KEY_STEP, "the keys have arrived")
+    np.testing.assert_allclose(desk.target - place, [3 * KEY_STEP, 0.0, 2 * KEY_STEP], atol=1e-9)
     desk.pause(False)
     served.assert_until(lambda: float(np.linalg.norm(desk.now["user"])) > 0.2, "the hand pulls")
     tab.keyboard.press("h")

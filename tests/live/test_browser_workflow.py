@@ -279,7 +279,7 @@ def test_second_browser_watches_and_takes_over_an_idle_driver(
         button(other, "Drive").click()
         other.get_by_text("Somebody drives.").last.wait_for()
         assert arbiter.client == first
-        monkeypatch.setattr(driver, "IDLE", 0.0)
+        monkeypatch.setattr(driver, "MAX_IDLE_TIME", 0.0)
         button(other, "Drive").click()
         served.assert_until(lambda: arbiter.client not in (None, first), "the other one drives")
         button(other, "Reset").click()

@@ -24,6 +24,6 @@ def test_only_an_idle_driver_is_replaced(monkeypatch: pytest.MonkeyPatch):
     arbiter.may(1)
     now[0] += 5.0
     assert not arbiter.take_over(2)
-    now[0] += driver.IDLE
+    now[0] += driver.MAX_IDLE_TIME
     assert arbiter.take_over(2)
     assert not arbiter.may(1)

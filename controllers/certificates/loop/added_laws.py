@@ -17,7 +17,7 @@ from geometry.arrays import Array
 
 # Phases of the curve at which a law is linearised: 20 times as many as those of the loop, since a case may hold on only
 # a short part of the curve.
-REFERENCES = 20 * N_PHASES
+N_REFERENCES = 20 * N_PHASES
 
 
 def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
@@ -44,7 +44,7 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
         return [river]
     if river.k_r <= 0.0:
         raise ControllerError("a certificate of user-defined laws needs a stiffness k_r above zero beside them")
-    phases = river.phases(REFERENCES)
+    phases = river.phases(N_REFERENCES)
     points, velocity = river.curve.point(phases), river.curve.velocity(phases)
     # At rest on the curve, and at the curve's speed: the states about which the loop is linearised.
     references = np.hstack([np.vstack([points, points]), np.vstack([0.0 * velocity, velocity])])

@@ -40,7 +40,7 @@ from geometry.arrays import Array
 TAYLOR_TERMS = 12  # terms of the exponential series over a period: the remainder is below 1e-9 while b_h T/μ < 1
 LENGTH_SCALE = 0.01  # [m] scale of the forms, for conditioning
 # Masses at which the optimisation requires the decrease (2 or 6 work too); the check requires it everywhere.
-MASSES = 3
+N_MASSES = 3
 _MASS_SCALE, _DAMPING_SCALE, _STIFFNESS_SCALE = 0.1, 8.0, 500.0  # [kg], [N s/m], [N/m] scales of the unknowns
 # Weights. With these, a hand 5.0 mm off the demo's curve, or with an error of 0.125 m/s, comes within 1.8 mm. Half or
 # twice the first: from 5.0 or 4.4 mm to 1.8 or 2.2 mm. Half or twice the second: from 5.0 or 5.4 mm to 1.65 or 1.8 mm.
@@ -48,8 +48,8 @@ _MASS_SCALE, _DAMPING_SCALE, _STIFFNESS_SCALE = 0.1, 8.0, 500.0  # [kg], [N s/m]
 FILTER_WEIGHT = 10.0  # weight of the extent in the filter's state, which decays in a period or two
 SPEED_WEIGHT = 0.25  # weight of the extent in velocity relative to that in position
 PUSH_WEIGHT = 10.0  # weight of the level that the neglected forces sustain, relative to the extent
-PARAMETERS = 4  # of an axis: μ, b_h, k_h, w
-CHANNELS = 2  # of neglected forces: in newtons, and in the metric
+N_PARAMETERS = 4  # of an axis: μ, b_h, k_h, w
+N_CHANNELS = 2  # of neglected forces: in newtons, and in the metric
 
 
 class Axis(NamedTuple):
@@ -75,7 +75,7 @@ class Axis(NamedTuple):
 
     def matrix(self, z: Any) -> list[list[Any]]:
         """A(μ) in units of `scale`, for z = (μ, b_h, k_h, w), symbols or numbers."""
-        mass, drag, spring, share = (z[i] for i in range(PARAMETERS))
+        mass, drag, spring, share = (z[i] for i in range(N_PARAMETERS))
         t, n = self.period, self.size
         # Columns of e, ν and the integral of ν after a period, for a unit of e, of ν, and of a constant force.
         columns: list[list[Any]] = []
@@ -123,11 +123,11 @@ class Cell(NamedTuple):
         """Bound on √(the device's own part of μ) [√kg], of the same shape as `mass`."""
         return np.sqrt(np.minimum(self.own, mass - (self.low[0] - self.lightest)))
 
-    def corners(self, masses: int = MASSES) -> Array:
+    def corners(self, masses: int = N_MASSES) -> Array:
         """A grid of masses, combined with every corner of the other parameters, shape (n, 4)."""
         grid = np.geomspace(self.low[0], self.high[0], masses)
-        ends = [np.unique([self.low[i], self.high[i]]) for i in range(1, PARAMETERS)]
-        return np.stack(np.meshgrid(grid, *ends, indexing="ij"), axis=-1).reshape(-1, PARAMETERS)
+        ends = [np.unique([self.low[i], self.high[i]]) for i in range(1, N_PARAMETERS)]
+        return np.stack(np.meshgrid(grid, *ends, indexing="ij"), axis=-1).reshape(-1, N_PARAMETERS)
 
 
 class Form(NamedTuple):
@@ -190,7 +190,7 @@ def decrease(axis: Axis, a: Any, pushes: Any, p: Any, form: Form) -> list[list[A
     """
     n, t = axis.size, axis.period
     whole = [[*a[i], *pushes[i]] for i in range(n)]
-    size, keep = n + CHANNELS, np.exp(-2.0 * form.rate * t)
+    size, keep = n + N_CHANNELS, np.exp(-2.0 * form.rate * t)
     after = _congruent(whole, p)
     matrix = [
         [((keep * p[i][j] if i < n and j < n else 0.0) - after[i][j]) / t for j in range(size)] for i in range(size)
@@ -220,12 +220,12 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     of the level set's size, with a barrier −Σ log det(M + s I); it starts from an interior point, with s large.
     """
     n, entries = axis.size, axis.size * (axis.size + 1) // 2
-    x, s = ca.SX.sym("x", 2 * entries + 6 + CHANNELS), ca.SX.sym("s")
+    x, s = ca.SX.sym("x", 2 * entries + 6 + N_CHANNELS), ca.SX.sym("s")
 
     def form_of(values: Any) -> Form:
         low, slope = (_symmetric_matrix([values[k * entries + i] for i in range(entries)], n) for k in range(2))
         rest = [values[2 * entries + i] for i in range(5)]
-        gains = [values[2 * entries + 6 + i] for i in range(CHANNELS)]
+        gains = [values[2 * entries + 6 + i] for i in range(N_CHANNELS)]
         slope = [[value / _MASS_SCALE for value in row] for row in slope]
         hand, (sigma, bound, gauge) = [rest[0] / _DAMPING_SCALE, rest[1] / _STIFFNESS_SCALE], rest[2:]
         return Form(low, slope, hand, rate, sigma, bound, gauge, gains, limits.pushes)  # pyright: ignore[reportArgumentType]
@@ -242,7 +242,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     with raise_lost_interrupts():
         first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(
-        [_initial_form(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * CHANNELS, [1e5]]
+        [_initial_form(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * N_CHANNELS, [1e5]]
     )
     with raise_lost_interrupts():
         found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()

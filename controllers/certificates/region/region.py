@@ -29,14 +29,14 @@ from geometry.arrays import Array
 # [m], [m/s] limits of a region, beyond which the bounds on the remainder grow too fast. The demo's region reaches
 # 5.0 mm and 0.125 m/s. With twice the first, or half the second, no form suits all its hands; with half the first it
 # reaches 2.7 mm.
-MAX_RADIUS, SPEED = 0.006, 0.25
+MAX_RADIUS, MAX_SPEED = 0.006, 0.25
 # Required rates of a form, as fractions of the slowest axis' own rate. With 0.7 alone the demo's region reaches 5.3 mm,
 # but the hand comes only within 2.2 mm, instead of 1.8.
 RATE_FRACTIONS = (0.82, 0.6)
 # Fraction of the hands' intervals that is the firm part: the largest mass and damping, the smallest stiffness. It is
 # examined where no form suits all hands.
 STIFF_HAND_FRACTION = 0.2
-LEVELS = 40  # grid of √V between 0 and 1; with 80 the demo's hand comes within 1.65 mm instead of 1.8
+N_LEVELS = 40  # grid of √V between 0 and 1; with 80 the demo's hand comes within 1.65 mm instead of 1.8
 REPORT_LEVEL = 0.5  # level at which the remainder is reported if there is no region
 CELL_COUNTS = (160, 8, 4, 1)  # parts of a cell of hands along μ, b_h, k_h, w
 # Fractions of the required rate that are tried, since the check needs a margin; the demo's region needs only the first.
@@ -76,9 +76,9 @@ def _find_levels(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, limits: Limits
 ) -> tuple[float, float]:
     """Largest invariant level ℓ, and the level of the ball reached; zeros if there is none."""
-    grid = np.arange(LEVELS + 1) / LEVELS
+    grid = np.arange(N_LEVELS + 1) / N_LEVELS
     invariant, decreases = [False], [False]
-    for i in range(1, LEVELS + 1):
+    for i in range(1, N_LEVELS + 1):
         rest = remainder(axis, form, cell, tube, course, share, float(grid[i]))
         inside = grid[i] * rest.distance <= limits.distance and grid[i] * rest.force <= limits.force
         force_term = _force_term(form, rest)
@@ -91,7 +91,7 @@ def _find_levels(
         decreases.append(invariant[i] and after(float(grid[i - 1])) < grid[i - 1])
     if not any(invariant):
         return 0.0, 0.0
-    top = max(i for i in range(LEVELS + 1) if invariant[i])
+    top = max(i for i in range(N_LEVELS + 1) if invariant[i])
     ball = top
     while decreases[ball]:
         ball -= 1
@@ -142,7 +142,7 @@ def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling
         return Search(None, None)
     steady = axis.damping * course.pace * hands.damping[1] / (axis.damping + hands.damping[1])
     limits = Limits(
-        min(ceiling, tube.motor_force) - steady, MAX_RADIUS, SPEED, _expected_forces(axis, cell, tube, course)
+        min(ceiling, tube.motor_force) - steady, MAX_RADIUS, MAX_SPEED, _expected_forces(axis, cell, tube, course)
     )
     for part in RATE_FRACTIONS:
         form = find_form(axis, cell, limits, -part * np.log(slowest) / axis.period)
@@ -169,7 +169,7 @@ def _expected_forces(axis: Axis, cell: Cell, tube: TubeBounds, course: Course) -
     shift = axis.damping / cell.low[0] * tube.rounding
     friction = tube.coulomb + (axis.damping + cell.high[1]) * shift + axis.stiffness * tube.rounding
     pace = axis.damping / (axis.damping + cell.low[1]) * course.pace
-    momentum = np.sqrt(tube.mass_high) * (pace + 0.5 * SPEED)
+    momentum = np.sqrt(tube.mass_high) * (pace + 0.5 * MAX_SPEED)
     return friction, float(momentum * (tube.coriolis * pace + tube.drag))
 
 

@@ -18,8 +18,8 @@ from controllers.certificates.report import CertificateError
 from controllers.curves.trajectory import Trajectory
 from geometry.arrays import Array
 
-SEGMENTS = 48  # of the curve: with 48 the bound on the demo's largest mass is 0.151 kg, with 24 0.179, with 96 0.145
-PARTS = 8  # of a segment's box along each joint: with 4 this bound is 0.184 kg, with 16 0.143 at five times the time
+N_SEGMENTS = 48  # of the curve: with 48 the bound on the demo's largest mass is 0.151 kg, with 24 0.179, with 96 0.145
+N_PARTS = 8  # of a segment's box along each joint: with 4 this bound is 0.184 kg, with 16 0.143 at five times the time
 
 
 class TubeBounds(NamedTuple):
@@ -129,18 +129,18 @@ def _boxes(device: Device, curve: Trajectory, radius: float, back: Any) -> tuple
     A straight path of the tip from the middle stays in the box if the joint motion along it, bounded by the rows of J⁻¹
     over the box, stays in it; this is checked.
     """
-    phases = curve.start + curve.duration * (np.arange(SEGMENTS) + 0.5) / SEGMENTS
-    fine = curve.velocity(np.linspace(curve.start, curve.end, 16 * SEGMENTS))
-    reach = radius + 0.51 * curve.duration / SEGMENTS * float(np.linalg.norm(fine, axis=1).max())
+    phases = curve.start + curve.duration * (np.arange(N_SEGMENTS) + 0.5) / N_SEGMENTS
+    fine = curve.velocity(np.linspace(curve.start, curve.end, 16 * N_SEGMENTS))
+    reach = radius + 0.51 * curve.duration / N_SEGMENTS * float(np.linalg.norm(fine, axis=1).max())
     middles = np.array([device.angles(point) for point in curve.point(phases)])
     rows = np.linalg.norm(bounds(back, middles, middles)[1], axis=2)
-    cuts = np.array(list(itertools.product(range(PARTS), repeat=3)))
+    cuts = np.array(list(itertools.product(range(N_PARTS), repeat=3)))
     for enlargement in (1.1, 1.3, 1.6):
         half = enlargement * rows * reach
-        corner = (middles - half)[:, None] + 2.0 * half[:, None] * cuts / PARTS
-        low, high = corner.reshape(-1, 3), (corner + 2.0 * half[:, None] / PARTS).reshape(-1, 3)
+        corner = (middles - half)[:, None] + 2.0 * half[:, None] * cuts / N_PARTS
+        low, high = corner.reshape(-1, 3), (corner + 2.0 * half[:, None] / N_PARTS).reshape(-1, 3)
         ends = bounds(back, low, high)
         needed = np.linalg.norm(np.maximum(np.abs(ends[0]), np.abs(ends[1])), axis=2) * reach
-        if np.all(needed.reshape(SEGMENTS, -1, 3).max(axis=1) <= half):
+        if np.all(needed.reshape(N_SEGMENTS, -1, 3).max(axis=1) <= half):
             return low, high
     raise CertificateError("the tube comes too near to a singular configuration of the arm")

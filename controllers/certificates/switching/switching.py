@@ -40,9 +40,9 @@ from controllers.curves.closest_point import closest_phases
 from controllers.fields.algebra.window import window
 from geometry.arrays import Array
 
-CORE = 0.1  # fraction of a tube's radius within which the hysteresis bounds the dwell time
+CORE_FRACTION = 0.1  # fraction of a tube's radius within which the hysteresis bounds the dwell time
 # Steepest ε/σ · d√g/dd in the core.
-_MAX_COST_SLOPE = 6.0 * CORE / ((1.0 - CORE**2) * math.sqrt(-6.0 * math.log(1.0 - CORE**2)))
+_MAX_COST_SLOPE = 6.0 * CORE_FRACTION / ((1.0 - CORE_FRACTION**2) * math.sqrt(-6.0 * math.log(1.0 - CORE_FRACTION**2)))
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class HandRetention:
 
 
 def hysteresis_dwell(retentions: Sequence[HandRetention], push: float) -> float:
-    r"""Lower bound [s] of the time between two changes, within `CORE` of a tube's radius of the curves.
+    r"""Lower bound [s] of the time between two changes, within `CORE_FRACTION` of a tube's radius of the curves.
 
     .. math:: \tau_d = \frac{h - 2 (\nu + c\,\delta)}{a + c\,|e|}, \qquad
               c = \frac{|e|}{\tau |\dot\varphi|} + \kappa\frac{\sigma}{\varepsilon}, \qquad
@@ -232,11 +232,11 @@ def hysteresis_dwell(retentions: Sequence[HandRetention], push: float) -> float:
         linear = river.still()
         inertia = np.linalg.eigvalsh(linear.jacobian @ np.linalg.inv(linear.mass) @ linear.jacobian.transpose(0, 2, 1))
         speeds = np.linalg.norm(river.curve.velocity(river.phases()), axis=1)
-        spring_speed = CORE * river.width * river.k_r / river.b_d
+        spring_speed = CORE_FRACTION * river.width * river.k_r / river.b_d
         error = (sharing.admission + sharing.hysteresis) * math.sqrt(1.0 + (spring_speed / speeds.min()) ** 2)
         joints = np.linalg.norm(np.linalg.inv(linear.jacobian), 2, axis=(1, 2)).max()
         friction = float(joints * np.linalg.norm(river.device.coulomb))
-        force = push + friction + river.k_r * CORE * river.width + river.b_d * error
+        force = push + friction + river.k_r * CORE_FRACTION * river.width + river.b_d * error
         by_place = error * river.k_r / river.b_d / float(speeds.min()) + _MAX_COST_SLOPE * sharing.sigma / river.width
         rounding = retention.noise + by_place * retention.reading
         rate = float(inertia.max()) * force + by_place * error

@@ -20,9 +20,9 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.state import HandState
 from geometry.arrays import Array
 
-LOST = 0.02  # [s] without an active river after which a hand counts as thrown out
-EARLIER, SECONDS = 0.6, 1.3  # [s] time by which a hand starts before the rivers meet, and duration of its simulation
-CHANGES = 3  # changes of river within `LOST` that count as chattering
+LOSS_TIME = 0.02  # [s] without an active river after which a hand counts as thrown out
+APPROACH_TIME, SEARCH_TIME = 0.6, 1.3  # [s] from the start of a hand to where rivers meet, and of its simulation
+MIN_CHATTER_CHANGES = 3  # changes of river within `LOSS_TIME` that count as chattering
 
 
 class Push(NamedTuple):
@@ -136,13 +136,13 @@ def failure(river: Array, period: float, own: int, pushed: bool, smooth: bool = 
     smooth : bool
         Whether the form is smooth, with a force that does not jump: then only the last river and a loss count.
     """
-    window = max(CHANGES + 1, round(LOST / period))
+    window = max(MIN_CHATTER_CHANGES + 1, round(LOSS_TIME / period))
     owned = np.logical_or.accumulate(river == own)
     changed = np.concatenate([[0.0], np.cumsum(np.diff(river) != 0.0)])
     lost = np.concatenate([[0.0], np.cumsum(river < 0.0)])
     for k in range(len(river)):
         first = max(0, k - window)
-        if not smooth and changed[k] - changed[first] >= CHANGES:
+        if not smooth and changed[k] - changed[first] >= MIN_CHATTER_CHANGES:
             return Failure("chatters", k * period)
         if k >= window and lost[k + 1] - lost[k + 1 - window] >= window:
             return Failure("thrown out", k * period)
@@ -193,7 +193,7 @@ def counterexample(
         The counterexample; empty if there is none.
     """
     place, along = river.curve.point(phase), river.curve.velocity(phase)
-    before = max(phase - EARLIER, river.curve.start + 1e-3) if not river.curve.periodic else phase - EARLIER
+    before = max(phase - APPROACH_TIME, river.curve.start + 1e-3) if not river.curve.periodic else phase - APPROACH_TIME
     linear = river.still()
     at = int(np.argmin(np.abs(river.phases() - phase)))
     loop = _at_phase(SampledLoop(linear, river.sampling), at)
@@ -209,16 +209,16 @@ def counterexample(
             starts.append((place, 0.5 * (along + towards)))
         for start, velocity in starts:
             for direction in directions:
-                push = Push(tuple((newtons * direction).tolist()), EARLIER - 0.15, 0.2)
+                push = Push(tuple((newtons * direction).tolist()), APPROACH_TIME - 0.15, 0.2)
                 at_meeting = start is place
-                simulated = course(field, loop, here, start, velocity, SECONDS, river.device, push)
+                simulated = course(field, loop, here, start, velocity, SEARCH_TIME, river.device, push)
                 if not at_meeting and simulated.river[0] not in (-1.0, own):
                     velocity = river.curve.velocity(before)
-                    simulated = course(field, loop, here, start, velocity, SECONDS, river.device, push)
+                    simulated = course(field, loop, here, start, velocity, SEARCH_TIME, river.device, push)
                 outcome = failure(simulated.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
                 if outcome is None:
                     continue
-                confirmation = simulate(start, velocity, SECONDS, push)
+                confirmation = simulate(start, velocity, SEARCH_TIME, push)
                 confirmed = failure(confirmation.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
                 if confirmed is not None and confirmed.kind == outcome.kind:
                     return {

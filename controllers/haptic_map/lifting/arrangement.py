@@ -26,15 +26,15 @@ from controllers.haptic_map.lifting.transitions import Transition
 from geometry.arrays import Array
 from geometry.easing import cubic_steps
 
-ROWS = 64  # control points round the lap
+N_ROWS = 64  # control points round the lap
 _SAMPLES_PER_ROW = 3
-SAMPLES = ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
+N_ANGLES = N_ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
 # The sensitivities of the constants in this folder were found with walk, run, jump and backflip, in a room with r from
 # 20 mm on. Distances of two clips are those of their curves at the transition.
 
 # [rad] distance from a transition within which two curves may be nearer than the separation. With half of it walk and
 # run come within 12.7 mm instead of 10.1, jump and backflip within 8.7 instead of 5.0.
-WINDOW = 0.9
+TRANSITION_WINDOW = 0.9
 # Target distance of the most different motions, as a fraction of the rectangle's diagonal. With 0.6 walk and run come
 # within 5.6 mm of each other, with 0.8 within 10.1, with 1.0 within 12.9; h_* changes by 11, 12 and 10 % per
 # millimetre.
@@ -68,10 +68,10 @@ class Task:
         Distance of two curves at a transition between equal poses [m].
     speed, acceleration : float
         Largest of the hand along a curve [m/s, m/s²].
-    distance : Array, shape (SAMPLES, n, n)
+    distance : Array, shape (N_ANGLES, n, n)
         Between poses [m].
     transitions : list of Transition
-    rate, change : Array, shape (SAMPLES, n)
+    rate, change : Array, shape (N_ANGLES, n)
         θ̇ and θ̈ of each clip at its own pace [rad/s, rad/s²].
     """
 
@@ -92,7 +92,7 @@ class Task:
         return _FILL_FRACTION * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
 
     def targets(self) -> tuple[Array, Array, Array]:
-        """T, S and w of the energy, each of shape (SAMPLES, n, n)."""
+        """T, S and w of the energy, each of shape (N_ANGLES, n, n)."""
         wanted = np.maximum(self.scale * self.distance, _SAFETY_FACTOR * self.separation)
         least = np.full(wanted.shape, _SAFETY_FACTOR * self.separation)
         weight = np.ones(wanted.shape)
@@ -107,16 +107,16 @@ class Task:
         return wanted, least, weight
 
     def windows(self) -> list[tuple[int, int, Array]]:
-        """Pairs with a transition, and a smooth step of the angle (SAMPLES,): 0 at it, 1 from `WINDOW` on."""
-        angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+        """Pairs with a transition, and a smooth step of the angle, (N_ANGLES,): 0 at it, 1 from the window on."""
+        angle = 2.0 * np.pi * np.arange(N_ANGLES) / N_ANGLES
         found: list[tuple[int, int, Array]] = []
         for at in self.transitions:
             away = np.abs(np.remainder(angle - at.angle + np.pi, 2.0 * np.pi) - np.pi)
-            found.append((at.first, at.second, cubic_steps(away / WINDOW)))
+            found.append((at.first, at.second, cubic_steps(away / TRANSITION_WINDOW)))
         return found
 
     def hand_motion(self, q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
-        """Velocity and acceleration of the hand along r, θ and z, each (3, SAMPLES, n); see `evaluate_sites`."""
+        """Velocity and acceleration of the hand along r, θ and z, each (3, N_ANGLES, n); see `evaluate_sites`."""
         r, dr, dz, ddr, ddz = q[..., 0], dq[..., 0], dq[..., 1], ddq[..., 0], ddq[..., 1]
         w, a = self.rate, self.change
         velocity = np.stack([w * dr, w * r, w * dz])
@@ -124,7 +124,7 @@ class Task:
 
 
 class _SplineMatrices(NamedTuple):
-    """Matrices (SAMPLES, ROWS) that give value and derivatives by θ of periodic cubic B-splines at the samples."""
+    """Matrices (N_ANGLES, N_ROWS) that give value and derivatives by θ of periodic cubic B-splines at the samples."""
 
     value: csr_array
     slope: csr_array
@@ -132,32 +132,32 @@ class _SplineMatrices(NamedTuple):
 
 
 def _spline_matrices() -> _SplineMatrices:
-    matrices = np.zeros((3, SAMPLES, ROWS))
-    rate = ROWS / (2.0 * np.pi)
-    for k in range(SAMPLES):
+    matrices = np.zeros((3, N_ANGLES, N_ROWS))
+    rate = N_ROWS / (2.0 * np.pi)
+    for k in range(N_ANGLES):
         row, u = k // _SAMPLES_PER_ROW, (k % _SAMPLES_PER_ROW) / _SAMPLES_PER_ROW
         value = [(1 - u) ** 3, 3 * u**3 - 6 * u**2 + 4, -3 * u**3 + 3 * u**2 + 3 * u + 1, u**3]
         slope = [-3 * (1 - u) ** 2, 9 * u**2 - 12 * u, -9 * u**2 + 6 * u + 3, 3 * u**2]
         bend = [6 * (1 - u), 18 * u - 12, -18 * u + 6, 6 * u]
-        columns = (row + np.arange(-1, 3)) % ROWS
+        columns = (row + np.arange(-1, 3)) % N_ROWS
         for matrix, numbers, unit in zip(matrices, (value, slope, bend), (1.0, rate, rate**2), strict=True):
             matrix[k, columns] = unit * np.array(numbers) / 6.0
     return _SplineMatrices(*(csr_array(matrix) for matrix in matrices))
 
 
 _MATRICES = _spline_matrices()
-_SLOPE_UNIT = SAMPLES * _LENGTH_UNIT**2
+_SLOPE_UNIT = N_ANGLES * _LENGTH_UNIT**2
 
 
 def sites_of(controls: Array) -> Array:
-    """Sites at `ROWS` equal steps of θ, shape (ROWS, n, 2), from control points of the same shape."""
+    """Sites at `N_ROWS` equal steps of θ, shape (N_ROWS, n, 2), from control points of the same shape."""
     return evaluate_sites(controls)[0][::_SAMPLES_PER_ROW]
 
 
 def evaluate_sites(controls: Array) -> tuple[Array, Array, Array]:
-    """Sites at the samples of the lap and their first and second derivatives by θ, each (SAMPLES, n, 2)."""
-    flat = controls.reshape(ROWS, -1)
-    q, dq, ddq = ((matrix @ flat).reshape(SAMPLES, -1, 2) for matrix in _MATRICES)
+    """Sites at the samples of the lap and their first and second derivatives by θ, each (N_ANGLES, n, 2)."""
+    flat = controls.reshape(N_ROWS, -1)
+    q, dq, ddq = ((matrix @ flat).reshape(N_ANGLES, -1, 2) for matrix in _MATRICES)
     return q, dq, ddq
 
 
@@ -174,9 +174,9 @@ class Energy:
         self._mean_square = float(square.mean()) if n > 1 else 1.0
 
     def __call__(self, flat: Array) -> tuple[float, Array]:
-        """E and its gradient at control points (ROWS · n · 2,)."""
+        """E and its gradient at control points (N_ROWS · n · 2,)."""
         task = self._task
-        controls = flat.reshape(ROWS, -1, 2)
+        controls = flat.reshape(N_ROWS, -1, 2)
         q, dq, ddq = evaluate_sites(controls)
         apart, g_q = self._distance_terms(q)
         stiff = _BEND_WEIGHT / _SLOPE_UNIT * (1.0 + (task.rate[..., None] / _BEND_RATE) ** 4)
@@ -190,13 +190,13 @@ class Energy:
         g_dq = g_dq + g_slant
         g_q = g_q + np.stack([w * g_v[1] - w * w * g_u[0] + a * g_u[1], np.zeros_like(w)], axis=-1)
         g_ddq = g_ddq + np.stack([w * w * g_u[0], w * w * g_u[2]], axis=-1)
-        gradient = np.zeros((ROWS, controls.shape[1] * 2))
+        gradient = np.zeros((N_ROWS, controls.shape[1] * 2))
         for matrix, g in zip(_MATRICES, (g_q, g_dq, g_ddq), strict=True):
-            gradient += matrix.T @ g.reshape(SAMPLES, -1)
+            gradient += matrix.T @ g.reshape(N_ANGLES, -1)
         return float(apart + slant + bend + fast + hard), gradient.ravel()
 
     def _distance_terms(self, q: Array) -> tuple[float, Array]:
-        """Stress and separation terms, and their gradient by the sites (SAMPLES, n, 2)."""
+        """Stress and separation terms, and their gradient by the sites (N_ANGLES, n, 2)."""
         i, j = self._pairs
         if not len(i):
             return 0.0, np.zeros_like(q)
@@ -205,7 +205,7 @@ class Energy:
         error = distance - self._target[:, i, j]
         weight = self._weight[:, i, j] / self._mean_square
         short = np.maximum(1.0 - distance / self._min_distance[:, i, j], 0.0)
-        share = 1.0 / SAMPLES
+        share = 1.0 / N_ANGLES
         total = share * (weight * error**2).sum() / q.shape[1] + share * _SEPARATION_WEIGHT * (short**2).sum()
         slope = share * 2.0 * (weight * error / q.shape[1] - _SEPARATION_WEIGHT * short / self._min_distance[:, i, j])
         pull = (slope / distance)[..., None] * step
@@ -224,14 +224,15 @@ class Energy:
 
 
 def _limit_penalty(v: Array, limit: float) -> tuple[float, Array]:
-    """Penalty of vectors (3, SAMPLES, n) longer than allowed, and its gradient."""
+    """Penalty of vectors (3, N_ANGLES, n) longer than allowed, and its gradient."""
     size = np.sqrt((v**2).sum(axis=0) + 1e-24)
     over = np.maximum(size / limit - 1.0, 0.0)
-    return _LIMIT_WEIGHT * float((over**2).sum()) / SAMPLES, 2.0 * _LIMIT_WEIGHT / SAMPLES * (over / (limit * size)) * v
+    slope = 2.0 * _LIMIT_WEIGHT / N_ANGLES * (over / (limit * size)) * v
+    return _LIMIT_WEIGHT * float((over**2).sum()) / N_ANGLES, slope
 
 
 def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Control points (ROWS, n, 2) of the arrangement, and of the first initial guess.
+    """Control points (N_ROWS, n, 2) of the arrangement, and of the first initial guess.
 
     The energy is minimised (L-BFGS-B) from positions that reproduce the motions' mean distances, from a lattice, and
     from a perturbation of the first; the result of least energy that keeps the curves apart is returned. If none does,
@@ -250,27 +251,27 @@ def arrange(task: Task, rng: np.random.Generator) -> tuple[Array, Array]:
     jitter = 0.1 * (rectangle.high - rectangle.low)
     layouts = [first, lattice_layout, first + rng.uniform(-1.0, 1.0, (n, 2)) * jitter]
     energy = Energy(task)
-    bounds = list(zip(np.tile(rectangle.low, ROWS * n), np.tile(rectangle.high, ROWS * n), strict=True))
-    best, least = np.tile(lattice_layout, (ROWS, 1, 1)), np.inf
+    bounds = list(zip(np.tile(rectangle.low, N_ROWS * n), np.tile(rectangle.high, N_ROWS * n), strict=True))
+    best, least = np.tile(lattice_layout, (N_ROWS, 1, 1)), np.inf
     for layout in layouts:
         # Without noise, coincident sites would have no gradient that separates them.
         noise = 1e-4 * rng.uniform(-1.0, 1.0, (n, 2))
         start = np.clip(layout + noise, rectangle.low, rectangle.high)
         result = minimize(
-            energy, np.tile(start, (ROWS, 1, 1)).ravel(), jac=True, method="L-BFGS-B", bounds=bounds,
+            energy, np.tile(start, (N_ROWS, 1, 1)).ravel(), jac=True, method="L-BFGS-B", bounds=bounds,
             options={"maxiter": 200, "maxcor": 20},
         )  # fmt: skip
-        controls = np.asarray(result.x).reshape(ROWS, n, 2)
+        controls = np.asarray(result.x).reshape(N_ROWS, n, 2)
         if float(result.fun) < least and is_apart(task, controls):
             best, least = controls, float(result.fun)
-    return best, np.tile(first, (ROWS, 1, 1))
+    return best, np.tile(first, (N_ROWS, 1, 1))
 
 
 def is_apart(task: Task, controls: Array) -> bool:
     """Whether sites keep the separation at every angle, and near their transitions half of the approach."""
     q, _, _ = evaluate_sites(controls)
     n = q.shape[1]
-    least = np.full((SAMPLES, n, n), task.separation)
+    least = np.full((N_ANGLES, n, n), task.separation)
     for first, second, near in task.windows():
         allowed = np.where(near < 1.0, 0.5 * task.approach, task.separation)
         least[:, first, second] = least[:, second, first] = np.minimum(least[:, first, second], allowed)

@@ -16,7 +16,7 @@ from controllers.motion.time_warping import least_cost_lead, smooth_lead
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
 
-SAMPLES = 385  # samples of a motion's features over its duration
+N_SAMPLES = 385  # samples of a motion's features over its duration
 _STEPS = 96  # steps of the lap in the dynamic programme
 _LEADS_PER_STEP = 4  # leads per step: the pace changes by quarters of the clip's own
 _MAX_LEAD = int(MAX_LEAD * _STEPS * _LEADS_PER_STEP)
@@ -96,10 +96,10 @@ def _return_gap(motion: Motion, own: Features) -> float:
 def _mismatch_table(own: Array, others: list[tuple[Array, Phase]], scale: float) -> Array:
     """Table of the mismatch of a clip's samples (columns) with other clips at steps of the lap (rows); zero in gaps."""
     lap = np.arange(_STEPS) / _STEPS
-    table = np.zeros((_STEPS, SAMPLES))
+    table = np.zeros((_STEPS, N_SAMPLES))
     for points, phase in others:
         s = phase.share(lap)
-        samples = points[np.round(np.minimum(s, 1.0) * (SAMPLES - 1)).astype(np.int64)]
+        samples = points[np.round(np.minimum(s, 1.0) * (N_SAMPLES - 1)).astype(np.int64)]
         square = squared_distances(samples, own)
         table += np.where(s[:, None] <= 1.0, square / (square + scale**2), 0.0)
     return table / len(others)
@@ -108,7 +108,7 @@ def _mismatch_table(own: Array, others: list[tuple[Array, Phase]], scale: float)
 def _table_entries(costs: Array, lap: Array, s: Array) -> Array:
     """Entries of the `_mismatch_table` at fractions of the lap and of the clip's time; 0 beyond the clip."""
     rows = np.round(lap * _STEPS).astype(np.int64) % _STEPS
-    columns = np.round(np.clip(s, 0.0, 1.0) * (SAMPLES - 1)).astype(np.int64)
+    columns = np.round(np.clip(s, 0.0, 1.0) * (N_SAMPLES - 1)).astype(np.int64)
     return np.where(s <= 1.0, costs[rows, columns], 0.0)
 
 
@@ -172,7 +172,7 @@ def common_lap(motions: list[Motion], own: list[Features]) -> list[Phase]:
     ----------
     motions : list of Motion
     own : list of Features
-        Features of the motions at `SAMPLES` steps.
+        Features of the motions at `N_SAMPLES` steps.
     """
     points = [
         np.concatenate([each.pose, _VELOCITY_TIME * each.velocity, _SUPPORT_DISTANCE * each.support], axis=1)

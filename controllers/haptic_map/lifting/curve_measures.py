@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, evaluate_sites
+from controllers.haptic_map.lifting.arrangement import N_ANGLES, Task, evaluate_sites
 from controllers.haptic_map.lifting.transitions import Transition
 from geometry.arrays import Array
 
@@ -52,10 +52,10 @@ class ArrangementMeasure(NamedTuple):
     Attributes
     ----------
     separation : float
-        Least distance of two curves at one angle, `WINDOW` or further from their transitions [m]; infinite for one
-        curve.
+        Least distance of two curves at one angle, at least `TRANSITION_WINDOW` from their transitions [m]; infinite for
+        one curve.
     nearest : float
-        The same in space: between any two points of two curves, both `WINDOW` or further from their transitions [m].
+        The same in space: any two points of two curves, both at least `TRANSITION_WINDOW` from their transitions [m].
     stress : float
         Deviation of the curves' distances from those of the poses, at the best scale κ: √(Σ (D − κd)² / Σ D²).
     curves : tuple of CurveMeasure
@@ -70,10 +70,10 @@ class ArrangementMeasure(NamedTuple):
 
 
 def measure(task: Task, controls: Array) -> ArrangementMeasure:
-    """Measure an arrangement of control points (ROWS, n, 2)."""
+    """Measure an arrangement of control points (N_ROWS, n, 2)."""
     q, dq, ddq = evaluate_sites(controls)
     n = q.shape[1]
-    angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+    angle = 2.0 * np.pi * np.arange(N_ANGLES) / N_ANGLES
     r, z, c, s = q[..., 0], q[..., 1], np.cos(angle)[:, None], np.sin(angle)[:, None]
     points = np.stack([r * c, r * s, z], axis=-1)
     v, u = (np.moveaxis(part, 0, -1) for part in task.hand_motion(q, dq, ddq))
@@ -83,12 +83,12 @@ def measure(task: Task, controls: Array) -> ArrangementMeasure:
         CurveMeasure(float(1.0 / bend[:, i].max()), float(speed[:, i].max()), float(pull[:, i].max())) for i in range(n)
     ]
     distances = np.linalg.norm(q[:, :, None] - q[:, None], axis=-1)
-    apart = np.ones((SAMPLES, n, n), dtype=np.bool_)
+    apart = np.ones((N_ANGLES, n, n), dtype=np.bool_)
     for first, second, near in task.windows():
         apart[:, first, second] &= near >= 1.0
     meetings: list[Meeting] = []
     for at in task.transitions:
-        k, i, j = round(at.angle / (2.0 * np.pi) * SAMPLES) % SAMPLES, at.first, at.second
+        k, i, j = round(at.angle / (2.0 * np.pi) * N_ANGLES) % N_ANGLES, at.first, at.second
         along = float(np.clip(v[k, i] @ v[k, j] / (speed[k, i] * speed[k, j]), -1.0, 1.0))
         meetings.append(
             Meeting(at, float(distances[k, i, j]), float(np.arccos(along)), (float(speed[k, i]), float(speed[k, j])))

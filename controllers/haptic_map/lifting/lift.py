@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.lifting.arrangement import SAMPLES, Task, arrange, sites_of
-from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
-from controllers.haptic_map.lifting.common_lap import Phase, common_lap
+from controllers.haptic_map.lifting.arrangement import N_ANGLES, Task, arrange, sites_of
+from controllers.haptic_map.lifting.common_lap import N_SAMPLES, Phase, common_lap
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure, measure
-from controllers.haptic_map.lifting.frames import CLOSES, closing_gap
+from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, closing_gap
 from controllers.haptic_map.lifting.layouts import lattice
 from controllers.haptic_map.lifting.motion_features import Features, Motion, features
 from controllers.haptic_map.lifting.room import Room
@@ -82,7 +81,7 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     for motion in clips:
         _check_motion(motion)
     _check_room(len(clips), room)
-    clip_features = [features(motion, weights, STEPS) for motion in clips]
+    clip_features = [features(motion, weights, N_SAMPLES) for motion in clips]
     phases = common_lap(clips, clip_features)
     laps = np.array([clip.duration / (1.0 - phase.gap) for clip, phase in zip(clips, phases, strict=True)])
     compared = _compare_clips(clip_features, phases, laps)
@@ -115,7 +114,7 @@ def _check_motion(motion: Motion) -> None:
             "clip, or one with more frames a second"
         )
     gap = closing_gap(motion.poses) if motion.closed else 0.0
-    if gap > CLOSES:
+    if gap > MAX_CLOSURE_GAP:
         raise ParameterError(
             f"clip {motion.name!r} is given as cyclic, but its last frame is {gap:.2g} (m, or half radians) from its "
             "first one moved over the ground; lift it as an open clip, or cut it where it repeats"
@@ -150,14 +149,14 @@ def _check_speeds(clips: list[Motion], rate: Array, change: Array, room: Room) -
 
 
 def _compare_clips(clip_features: list[Features], phases: list[Phase], laps: Array) -> Comparison:
-    lap = np.arange(SAMPLES) / SAMPLES
+    lap = np.arange(N_ANGLES) / N_ANGLES
     moments: list[Features] = []
     inside: list[Mask] = []
     for each, phase in zip(clip_features, phases, strict=True):
         s = phase.share(lap)
         if phase.gap == 0.0:
             moments.append(each.at(np.mod(s, 1.0)))
-            inside.append(np.ones(SAMPLES, dtype=np.bool_))
+            inside.append(np.ones(N_ANGLES, dtype=np.bool_))
             continue
         # In the gap an open clip returns from its end to its start; no transition may lie there.
         back = np.clip((s - 1.0) * (1.0 - phase.gap) / phase.gap, 0.0, 1.0)
@@ -167,8 +166,8 @@ def _compare_clips(clip_features: list[Features], phases: list[Phase], laps: Arr
 
 
 def _angular_rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Array]:
-    """θ̇ and θ̈ of each clip at its own pace, at equal steps of θ, shape (SAMPLES, n)."""
-    lap = np.arange(SAMPLES) / SAMPLES
+    """θ̇ and θ̈ of each clip at its own pace, at equal steps of θ, shape (N_ANGLES, n)."""
+    lap = np.arange(N_ANGLES) / N_ANGLES
     rates: list[Array] = []
     changes: list[Array] = []
     for motion, phase in zip(clips, phases, strict=True):
@@ -183,4 +182,4 @@ def _angular_rates(clips: list[Motion], phases: list[Phase]) -> tuple[Array, Arr
 
 def closes(poses: Array) -> bool:
     """Whether a clip that passed `checked_clip` can be lifted as a closed curve."""
-    return len(poses) >= _MIN_FRAMES and closing_gap(poses) <= CLOSES
+    return len(poses) >= _MIN_FRAMES and closing_gap(poses) <= MAX_CLOSURE_GAP

@@ -112,7 +112,7 @@ class ClockPanel:
         self._desk.pause(False)
 
 
-STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
+KEY_STEP = 0.003  # [m] per press; at about thirty key repeats per second this is 0.1 m/s
 RELEASE_KEY = "H"
 KEY_DIRECTIONS: dict[str, tuple[str, Array]] = {
     "J": ("Hand to the left", np.array([-1.0, 0.0, 0.0])),
@@ -135,7 +135,7 @@ def add_hand_keys(gui: viser.GuiApi, desk: Desk, acts: Acts, pressed: Callable[[
     """
 
     def handler(direction: Array) -> Callable[[Any], None]:
-        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + STEP * direction, pressed())
+        return lambda event: desk.hold((desk.target if desk.holds else desk.now["p"]) + KEY_STEP * direction, pressed())
 
     for key, (label, direction) in KEY_DIRECTIONS.items():
         gui.add_command(label, hotkey=key).on_trigger(acts(handler(direction)))  # pyright: ignore[reportArgumentType]

@@ -10,7 +10,7 @@ from experiments.live.session.desk import numbers
 from geometry.arrays import Array
 from sim.viewer.palette import FIELD, TUBE, USER
 
-SECONDS = 12.0  # [s] that are plotted
+PLOT_SECONDS = 12.0  # [s] that are plotted
 
 
 class Plots:
@@ -39,7 +39,7 @@ class Plots:
 
     def write(self, history: deque[dict[str, Array]]) -> None:
         """Draw the last seconds of the history."""
-        t, force, user, distance, residual = numbers(history, ("force", "user", "distance", "residual"), SECONDS)
+        t, force, user, distance, residual = numbers(history, ("force", "user", "distance", "residual"), PLOT_SECONDS)
         if len(t) < 2:
             return
         distance = np.where(np.isfinite(distance), 1e3 * distance, np.nan)

@@ -22,7 +22,7 @@ from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import Snapshot, restore_snapshot, take_snapshot
 from sim.users.hand.dragged import dragged, relaxed, tremor
 
-BLOCK = 8  # ticks between two updates of the hand's target: 8 ms, too short to be visible as a pause
+BLOCK_TICKS = 8  # ticks between two updates of the hand's target: 8 ms, too short to be visible as a pause
 MAX_HAND_FORCE = 8.0  # [N] largest force of the hand, about the motors' peak force
 MAX_HAND_SPEED = 0.6  # [m/s] largest speed of the hand: a quick reach over the Phantom's workspace
 HAND_TIME_CONSTANT = 0.03  # [s] time constant with which the hand follows the mouse: two or three frames of the page
@@ -72,7 +72,7 @@ class Engine:
         # A copy, as the gains change here and the law must keep its own parameters.
         self._servo = session.servo._replace(field=field._replace(params=field.params.copy()))
         self._device, self._arm = session.servo.device, session.servo.device.user.arm
-        self._block = self._servo.figure_ticks * max(1, BLOCK // self._servo.figure_ticks)
+        self._block = self._servo.figure_ticks * max(1, BLOCK_TICKS // self._servo.figure_ticks)
         self.logs = make_logs(self._servo, self._block)
         self._tick_times: deque[float] = deque(maxlen=1000)
         self._intended_position = np.full(3, np.nan)

@@ -7,7 +7,7 @@ from geometry.arrays import Array
 from models.mocap.motion.clip import pose_difference
 from models.mocap.motion.kinematics import global_rotations, segment_positions
 
-METRE = 1.0  # [rad/m] weight of the root's displacement in the product metric
+ROOT_WEIGHT = 1.0  # [rad/m] weight of the root's displacement in the product metric
 
 
 def geodesic_distance(poses: Array, others: Array) -> Array:
@@ -19,7 +19,7 @@ def geodesic_distance(poses: Array, others: Array) -> Array:
     and 17 joints. A product metric needs a length for an angle: here a metre counts as a radian.
     """
     difference = pose_difference(poses, others)
-    difference[:, :3] *= METRE
+    difference[:, :3] *= ROOT_WEIGHT
     return np.linalg.norm(difference, axis=1)
 
 

@@ -32,7 +32,7 @@ from sim.recording.recording import Recording
 Span = tuple[float, float]
 """Start and end of a span of time [s]."""
 
-SETTLING = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
+SETTLING_TIME = 1.0  # [s] after the start or after a push, until a relaxed hand has settled on the curve
 MIN_PUSH_FORCE = 1e-3  # [N] force above which the hand counts as pushing
 STANDSTILL_RADIUS = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
@@ -112,7 +112,7 @@ def trace_summary(recording: Recording) -> TraceSummary:
     ticks, force = recording.groups["ticks"], 0.0
     for first in range(0, len(ticks["t"]), BLOCK_ROWS):
         force = max(force, float(np.linalg.norm(ticks["user"][first : first + BLOCK_ROWS], axis=1).max()))
-    away = _deviation(recording, SETTLING)
+    away = _deviation(recording, SETTLING_TIME)
     return TraceSummary(1e3 * away.root if away.count else None, force)
 
 
@@ -151,15 +151,15 @@ class PathMeasure:
         self._has_curve = False  # whether the field had a curve at any tick
 
     def add(self, ticks: Mapping[str, Array]) -> Mask:
-        """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING`."""
+        """Add a block; returns at which ticks the hand pushes, or has pushed within the last `SETTLING_TIME`."""
         t, size = ticks["t"], np.linalg.norm(ticks["user"], axis=1)
         at_work = size > MIN_PUSH_FORCE
         last = np.maximum.accumulate(np.where(at_work, t, self._last_push_time))
-        pushed = (t - last <= SETTLING) | self._replayed  # a replayed hand is never left alone
+        pushed = (t - last <= SETTLING_TIME) | self._replayed  # a replayed hand is never left alone
         self._last_push_time = float(last[-1])
         along = np.isfinite(ticks["distance"])  # infinite for a law without a curve
         self._has_curve |= bool(along.any())
-        self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING) & ~pushed & along])
+        self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING_TIME) & ~pushed & along])
         self._add_phase(t, ticks["phase"])
         self._add_position(t, ticks["p"])
         handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
@@ -209,7 +209,7 @@ class PathMeasure:
         laps = self._phase_travelled / self._span
         seconds, clip = self._last_time - self._start_time, self._clip_seconds
         lap_seconds = seconds / laps if laps >= 1.0 else None
-        stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING else None
+        stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING_TIME else None
         moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
         pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
         alone, most = (
@@ -241,7 +241,7 @@ class AnimationMeasure:
         self._next_row = (self._next_row - len(default)) % self._stride
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
-        settled = frames["t"] >= self._since + SETTLING
+        settled = frames["t"] >= self._since + SETTLING_TIME
         self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
         self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
 

@@ -4,27 +4,27 @@ import numpy as np
 
 from geometry.arrays import Array
 
-CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
-RATE = 100.0  # [Hz] at which the speed is sampled
+VELOCITY_CUTOFF = 20.0  # [Hz] of the low-pass on the velocity: above voluntary motion, below the noise of the encoders
+SPEED_RATE = 100.0  # [Hz] at which the speed is sampled
 _MAX_FREQUENCY, _AMPLITUDE_THRESHOLD, _PADDING_POWERS = 10.0, 0.05, 4  # [Hz], share of the largest value, powers of two
 _SETTLING_PERIODS = 2.0  # periods of the cutoff after which the filter's response to an end has decayed, to some 1e-4
 
 
 def speed_profile(velocity: Array, rate: float) -> Array:
-    r"""Speed |v| of a velocity (n, 3) sampled at `rate` [Hz], low-passed with zero phase and resampled at `RATE`.
+    r"""Speed |v| of a velocity (n, 3) sampled at `rate` [Hz], low-passed with zero phase and resampled at `SPEED_RATE`.
 
     The gain :math:`1/(1 + (f/f_c)^4)` is that of a second-order Butterworth filter run forwards and backwards. Beyond
     its ends the velocity is continued by point reflection. A velocity of at most `_SETTLING_PERIODS` periods of the
     cutoff frequency is not filtered.
     """
-    margin = round(_SETTLING_PERIODS / CUTOFF * rate)
+    margin = round(_SETTLING_PERIODS / VELOCITY_CUTOFF * rate)
     smooth = velocity
     if len(velocity) > margin:
         before, after = 2.0 * velocity[0] - velocity[margin:0:-1], 2.0 * velocity[-1] - velocity[-2 : -margin - 2 : -1]
         longer = np.concatenate([before, velocity, after])
-        share = 1.0 / (1.0 + (np.fft.rfftfreq(len(longer), 1.0 / rate) / CUTOFF) ** 4)
+        share = 1.0 / (1.0 + (np.fft.rfftfreq(len(longer), 1.0 / rate) / VELOCITY_CUTOFF) ** 4)
         smooth = np.fft.irfft(np.fft.rfft(longer, axis=0) * share[:, None], len(longer), axis=0)[margin:-margin]
-    return np.linalg.norm(smooth[:: max(1, round(rate / RATE))], axis=1)
+    return np.linalg.norm(smooth[:: max(1, round(rate / SPEED_RATE))], axis=1)
 
 
 def spectral_arc_length(speed: Array, rate: float) -> float:

@@ -24,7 +24,7 @@ from experiments.results.measures.phases import performance_start
 from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
-from sim.viewer.palette import CURVE, FIELD, PUSH, TUBE, USER
+from sim.viewer.palette import CURVE, FIELD, MIN_PUSH_FORCE, TUBE, USER
 from sim.viewer.shown import courses
 
 MAX_POINTS = 20_000  # most points drawn of a channel; of a longer channel every k-th row is drawn
@@ -80,7 +80,7 @@ def path_figure(recording: Recording) -> Figure:
     """Path of the hand with curve and tube, seen along z and along y of the hand frame H [mm]."""
     drawn, path = courses(recording.static), 1e3 * thinned_rows(recording, "p")
     radius = 1e3 * float(recording.arrays["tube_radius"])
-    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
+    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > MIN_PUSH_FORCE
     figure, axes = _panels(1, 2, height=3.6)
     for ax, (i, j), title in zip(axes, ((0, 1), (0, 2)), ("from above", "from the right"), strict=True):
         for course in drawn:
@@ -108,7 +108,7 @@ def deviation_figure(recording: Recording) -> Figure:
     """Distance of the hand from the curve over time [mm], pushes shaded; below, magnified to the unpushed hand."""
     t = thinned_rows(recording, "t")
     distance, radius = 1e3 * thinned_rows(recording, "distance"), 1e3 * float(recording.arrays["tube_radius"])
-    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > PUSH
+    pushed = np.linalg.norm(thinned_rows(recording, "user"), axis=1) > MIN_PUSH_FORCE
     figure, axes = _panels(2, 1, height=4.0)
     for ax in axes:
         shade(ax, t, pushed, PALE_USER, f"hand {_hand_action(recording)}")

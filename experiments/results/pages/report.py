@@ -19,7 +19,7 @@ from experiments.results.pages.mode_figures import arm_figure, lead_figure, stre
 from experiments.results.pages.plots import plots_html
 from sim.errors import SimError
 from sim.recording.recording import Recording
-from sim.viewer.palette import FIELD, PUSH, USER
+from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER
 from sim.viewer.replay_html import MAGNIFICATION, MAX_SECONDS, drawn_tube, replay_html
 from sim.viewer.shown import courses
 
@@ -127,7 +127,7 @@ def write_report(
         replayed=replayed,
         plots=plots_html(recording),
         curves=_curve_legend(recording, tube),
-        push=PUSH,
+        push=MIN_PUSH_FORCE,
         field=FIELD,
         user=USER,
         magnification=MAGNIFICATION,

@@ -15,7 +15,7 @@ from experiments.results.measures.lead_measures import lead_summary
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.hands import participant
-from experiments.setups.parts.leading_hand import BEND, leading_hand, s_curve
+from experiments.setups.parts.leading_hand import HALF_TURN, leading_hand, s_curve
 from experiments.setups.parts.led_figure import LedParts
 from experiments.setups.parts.part_types import Measuring, Notes, Parts
 from geometry.arrays import Array
@@ -24,7 +24,7 @@ from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
-FORTH = 5.0  # [s] along the S at the clip's own pace
+TRAVEL_TIME = 5.0  # [s] along the S at the clip's own pace
 _START_RADIUS = 0.025  # [m] largest distance of the hand from its place on the curve at the start
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, the figure falls after a slightly missed
 # landing.
@@ -74,10 +74,10 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     """
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
-    scale = FORTH * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
+    scale = TRAVEL_TIME * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
     flying = {"lateral": _MAX_FLYING_LATERAL} if gait.flies else {}
     running = {"forward": _MAX_RUNNING_PACE} if gait.flies or gait.grounded else {}
-    walking = Walking(gait, (float(x), float(y)), -BEND, scale, **flying, **running)
+    walking = Walking(gait, (float(x), float(y)), -HALF_TURN, scale, **flying, **running)
     return Leading(walking, k_l=mode.leash, b=mode.damping)
 
 

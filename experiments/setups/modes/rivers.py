@@ -35,8 +35,8 @@ SIGMA = {"discrete": 0.15, "smooth": 0.05}
 # smooth form's σ; without it a push changes river up to eight times instead of twice, laps of 8 s chatter without a
 # push, and laps of 14 s throw a relaxed hand out (docs/validation/crossing-rivers.md).
 SELECTION_TIME_CONSTANT = 8e-3
-GATE = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
-WAVE = 0.6  # height of the wave as a share of the map's half width
+GATE_ADMISSION = 0.4  # admission of rivers with intervals of admissible speed: a hand further outside them is not taken
+WAVE_FRACTION = 0.6  # height of the wave as a share of the map's half width
 
 
 def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
@@ -44,7 +44,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     stiffness, damping = river_gains(mode)
     course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
     if mode.governor is not None and gates_rivers(mode.crossing):
-        law = law_of(mode, gated(choice, maps), GATE)
+        law = law_of(mode, gated(choice, maps), GATE_ADMISSION)
     else:
         law, urged = governed(mode.governor, law_of(mode, choice), course, maps)
     bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
@@ -135,14 +135,15 @@ def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsil
     curve : Trajectory
         A lap about the z axis.
     reach : float
-        Half width of the map's domain [m]; the crests are at `WAVE` times it.
+        Half width of the map's domain [m]; the crests are at `WAVE_FRACTION` times it.
     tau, drag, epsilon : float
         τ [s], b [N s/m] and ε [m] of the rivers.
     """
     times = np.linspace(curve.start, curve.end, 129)
     level = curve.point(times)
     level[-1] = level[0]
-    height = WAVE * reach * np.stack((np.zeros(129), np.sin(4.0 * np.pi * np.linspace(0.0, 1.0, 129)), np.ones(129)))
+    wave = np.sin(4.0 * np.pi * np.linspace(0.0, 1.0, 129))
+    height = WAVE_FRACTION * reach * np.stack((np.zeros(129), wave, np.ones(129)))
     height[1, -1] = 0.0
     curves = [Trajectory(times, level + np.outer(z, [0.0, 0.0, 1.0]), periodic=True) for z in height]
     return RiverBundle(tuple(River(c, epsilon, tau, drag) for c in curves), ("level", "wave", "high"))

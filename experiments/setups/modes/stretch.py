@@ -23,7 +23,7 @@ from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.hands import (
-    PAUSE,
+    PAUSE_TIME,
     edited_until,
     first_pushed_lap,
     handling_spans,
@@ -41,10 +41,10 @@ from sim.world.world import FigureKind
 
 # [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
 # it.
-REACH = 1.8
+REACH_TIME = 1.8
 # Distance from the curve, in tube radii, at which the hand aims to press; the seeking spring pulls it in by a third.
-OUTSIDE = 2.2
-EASE = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
+PRESS_RATIO = 2.2
+EASE_TIME = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
 _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
 
 
@@ -103,7 +103,7 @@ def _make_parts(
     seek, damping = tube_gains(mode)
     tubes = StretchyTubes(
         course, seek, mode.rubber, damping,
-        epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE,
+        epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE_TIME,
         hold=mode.rubber_from,
     )  # fmt: skip
     pushed = first_pushed_lap(maps.curve, user.grabs)
@@ -180,18 +180,19 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     centre = curve.point(np.linspace(curve.start, curve.end, 64, endpoint=not curve.periodic)).mean(axis=0)
     away = (third - centre) / np.linalg.norm(third - centre)
     outwards = 0.02 * share * (first - centre) / np.linalg.norm(first - centre)
-    still = np.zeros(3)
+    still, pressed = np.zeros(3), PRESS_RATIO * epsilon
     actions = (
         (outwards, 1.3, 0.4, first),
         (np.array([0.0, 0.0, 0.015 * share]), 1.3, 0.4, second),
         (still, 0.15, 0.0, None),
         (still, 0.7, 0.0, None),
-        (-(OUTSIDE * epsilon - epsilon + share * (epsilon + 0.01)) * away, 1.3, 0.4, third + OUTSIDE * epsilon * away),
+        (-(pressed - epsilon + share * (epsilon + 0.01)) * away, 1.3, 0.4, third + pressed * away),
     )
     grabs: list[Grab] = []
     for carry, duration, hold, place in actions:
-        start = grabs[-1].end + PAUSE if grabs else PAUSE
-        grabs.append(Grab(start, _as_tuple(carry), duration, hold, None if place is None else _as_tuple(place), REACH))
+        start = grabs[-1].end + PAUSE_TIME if grabs else PAUSE_TIME
+        reached = None if place is None else _as_tuple(place)
+        grabs.append(Grab(start, _as_tuple(carry), duration, hold, reached, REACH_TIME))
     return tuple(grabs)
 
 

@@ -23,7 +23,7 @@ RIVER_PUSH = 1.0
 PUSH_START_DISTANCE = 3e-3
 # [m/s] in slower rivers every push tried was too weak to change river, or threw the hand out
 MIN_PUSHED_RIVER_SPEED = 0.0235
-PAUSE = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
+PAUSE_TIME = 0.5  # [s] between two actions of the default hand, and before a bent curve is performed
 TRACE_SAMPLE_TIME = 0.01  # [s] between samples of a path that the hand traces
 
 _CROSSING_PHASE = 0.5  # share of the lap at which the wave rises through the level river
@@ -181,7 +181,7 @@ def late_remark(user: User, seconds: float) -> tuple[str, ...]:
 
 def edited_until(grabs: tuple[Grab, ...]) -> float:
     """End of all grabs and the pause after them [s]."""
-    return max((grab.end for grab in grabs), default=0.0) + PAUSE
+    return max((grab.end for grab in grabs), default=0.0) + PAUSE_TIME
 
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:

@@ -22,7 +22,7 @@ from experiments.trials.analysis.interactions import interactions_of
 from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL, NO_FIT, Fit, fit_mixed_model
 from geometry.arrays import Array
 
-RESAMPLES = 4999
+N_RESAMPLES = 4999
 """Number of bootstrap resamples; (4999 + 1) × 2.5 % is whole, so that the ends of a percentile interval are resamples
 (Davison & Hinkley 1997, Bootstrap methods and their application)."""
 
@@ -203,7 +203,7 @@ def bootstrap_interval(samples: tuple[Array, ...], rng: np.random.Generator) -> 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a degenerate sample has the interval NaN, and is shown so
         ends = bootstrap(
-            samples, _difference, n_resamples=RESAMPLES, confidence_level=CONFIDENCE_LEVEL, rng=rng, method="BCa"
+            samples, _difference, n_resamples=N_RESAMPLES, confidence_level=CONFIDENCE_LEVEL, rng=rng, method="BCa"
         )
     return float(ends.confidence_interval.low), float(ends.confidence_interval.high)
 

@@ -1,6 +1,6 @@
 """Measures of a trial: accuracy, smoothness and effort of the hand, and their effect on the figure.
 
-Measuring begins `SETTLING` after the start of the trial, or in the middle of a trial shorter than twice that;
+Measuring begins `SETTLING_TIME` after the start of the trial, or in the middle of a trial shorter than twice that;
 measures of the physical figure begin with the trial.
 """
 
@@ -13,8 +13,13 @@ import numpy as np
 
 from experiments.config.run_config import PERSON_INTENTS, RunConfig
 from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
-from experiments.results.measures.run_measures import SETTLING
-from experiments.results.measures.smoothness import RATE, log_dimensionless_jerk, spectral_arc_length, speed_profile
+from experiments.results.measures.run_measures import SETTLING_TIME
+from experiments.results.measures.smoothness import (
+    SPEED_RATE,
+    log_dimensionless_jerk,
+    spectral_arc_length,
+    speed_profile,
+)
 from experiments.setups.session import Session, default_poses
 from geometry.arrays import Array, Mask
 from sim.body.falls import UP
@@ -143,7 +148,7 @@ def measures_of(figure: str) -> tuple[str, ...]:
 def measure_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
     """All measures of a completed trial, by name; NaN where there is nothing to measure."""
     ticks, frames = log.ticks, log.frames
-    start = min(SETTLING, 0.5 * float(ticks["t"][-1]))
+    start = min(SETTLING_TIME, 0.5 * float(ticks["t"][-1]))
     intent = intends_to_leave(config, ticks["t"])
     ticks, intent = {name: channel[ticks["t"] >= start] for name, channel in ticks.items()}, intent[ticks["t"] >= start]
     measures = dict.fromkeys(measures_of(config.figure.kind), _NAN)
@@ -162,11 +167,11 @@ def measure_trial(config: RunConfig, session: Session, log: TrialLog) -> dict[st
 def intends_to_leave(config: RunConfig, t: Array) -> Mask:
     """Whether the hand intends to leave the curve at times t [s]: always with one of `PERSON_INTENTS`, else in pushes.
 
-    A push counts from its start until `SETTLING` after its end.
+    A push counts from its start until `SETTLING_TIME` after its end.
     """
     if config.user.does in PERSON_INTENTS:
         return np.ones(len(t), dtype=bool)
-    spans = [(push.at, push.at + push.seconds + SETTLING) for push in config.user.pushes]
+    spans = [(push.at, push.at + push.seconds + SETTLING_TIME) for push in config.user.pushes]
     return np.any([(at <= t) & (t <= end) for at, end in spans], axis=0) if spans else np.zeros(len(t), dtype=bool)
 
 
@@ -192,13 +197,13 @@ def _hand_measures(ticks: Mapping[str, Array], intent: Mask, session: Session) -
 def _smoothness_per_lap(velocity: Array, rate: float, lap: float) -> tuple[float, float]:
     """Mean SPARC and log dimensionless jerk over windows of a lap, or over the whole if it is shorter than a lap."""
     speed = speed_profile(velocity, rate)
-    size = round(lap * RATE)
+    size = round(lap * SPEED_RATE)
     laps = [speed[k : k + size] for k in range(0, len(speed) - size + 1, size)] or [speed]
     if len(laps[0]) < 3:
         return _NAN, _NAN
     return (
-        float(np.mean([spectral_arc_length(one, RATE) for one in laps])),
-        float(np.mean([log_dimensionless_jerk(one, RATE) for one in laps])),
+        float(np.mean([spectral_arc_length(one, SPEED_RATE) for one in laps])),
+        float(np.mean([log_dimensionless_jerk(one, SPEED_RATE) for one in laps])),
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from sim.users.intents.intent import PERIOD, between, bump, centre, check, moments
+from sim.users.intents.intent import WISH_PERIOD, between, bump, centre, check, moments
 from sim.users.person.wishes import ENGAGED, GRIP, PLACE, Wishes, following, resting
 
 
@@ -15,7 +15,7 @@ class Relax:
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
-        return Wishes(resting(len(moments(seconds))), PERIOD, curve.duration)
+        return Wishes(resting(len(moments(seconds))), WISH_PERIOD, curve.duration)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Trace:
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
         points = curve.point(curve.start + self.tempo * moments(seconds))
-        return Wishes(following(points), PERIOD, curve.duration / self.tempo)
+        return Wishes(following(points), WISH_PERIOD, curve.duration / self.tempo)
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class CutCorner:
         cut = (phase > self.start) & (phase < self.end)
         share = ((phase[cut] - self.start) / (self.end - self.start))[:, None]
         points[cut] = (1.0 - share) * first + share * last
-        return Wishes(following(points), PERIOD, curve.duration)
+        return Wishes(following(points), WISH_PERIOD, curve.duration)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Exaggerate:
         phase = (t / curve.duration) % 1.0
         size = 1.0 + (self.larger - 1.0) * bump(phase, *self.where) + (self.calmer - 1.0) * bump(phase, *self.there)
         points = middle + size[:, None] * (curve.point(curve.start + t) - middle)
-        return Wishes(following(points), PERIOD, curve.duration)
+        return Wishes(following(points), WISH_PERIOD, curve.duration)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class ChangeOver:
         before, middle = curve.point(curve.start + t), centre(curve)
         after = middle + _ENLARGEMENT * (before - middle) if self.to is None else self.to.point(self.to.start + t)
         share = between(t, at, at + self.seconds)[:, None]
-        return Wishes(following((1.0 - share) * before + share * after), PERIOD)
+        return Wishes(following((1.0 - share) * before + share * after), WISH_PERIOD)
 
 
 _ENLARGEMENT = 1.35  # factor by which the default curve is enlarged about its centre
@@ -162,7 +162,7 @@ class GetLost:
         rows = following(curve.point(curve.start + t) + self.away * size[:, None] * wander)
         # In the middle she is passive for a moment.
         rows[(progress > 0.45) & (progress < 0.55), ENGAGED] = 0.0
-        return Wishes(rows, PERIOD)
+        return Wishes(rows, WISH_PERIOD)
 
 
 _FREQUENCIES = np.array([0.23, 0.41, 0.67])  # [Hz] without a short common period
@@ -196,4 +196,4 @@ class Resist:
         rows = following(curve.point(curve.start + curve_time))
         rows[is_staying, PLACE : PLACE + 3] = curve.point(curve.start + self.at)
         rows[is_staying, GRIP] = self.grip
-        return Wishes(rows, PERIOD)
+        return Wishes(rows, WISH_PERIOD)

@@ -9,7 +9,7 @@ from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, grab_table
-from sim.users.intents.intent import PERIOD, between, moments
+from sim.users.intents.intent import WISH_PERIOD, between, moments
 from sim.users.person.wishes import ENGAGED, PLACE, SWITCH, Wishes, resting
 
 
@@ -49,4 +49,4 @@ class Bend:
             rows[is_busy, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[is_busy]
             rows[is_busy, ENGAGED] = 1.0
             rows[is_busy & (t >= grip_start), SWITCH] = 1.0
-        return Wishes(rows, PERIOD)
+        return Wishes(rows, WISH_PERIOD)

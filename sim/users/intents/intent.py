@@ -11,7 +11,7 @@ from geometry.easing import smooth_steps
 from sim.errors import SimError
 from sim.users.person.wishes import Wishes
 
-PERIOD = 0.02  # [s] sampling period of wishes: shorter than any submovement
+WISH_PERIOD = 0.02  # [s] sampling period of wishes: shorter than any submovement
 
 
 @runtime_checkable
@@ -25,7 +25,7 @@ class PersonIntent(Protocol):
 
 def moments(seconds: float) -> Array:
     """Times of wishes [s], beyond the end of the run: her clock may run 1.5 times as fast, and she plans ahead."""
-    return np.arange(0.0, 1.5 * seconds + 1.0, PERIOD)
+    return np.arange(0.0, 1.5 * seconds + 1.0, WISH_PERIOD)
 
 
 def between(t: Array, start: float, end: float) -> Array:

@@ -9,7 +9,7 @@ from controllers.checks import check_kind, numbers_of
 from controllers.curves.trajectory import Trajectory
 from geometry.arrays import Array
 from sim.errors import SimError
-from sim.users.intents.intent import PERIOD, moments
+from sim.users.intents.intent import WISH_PERIOD, moments
 from sim.users.person.wishes import Wishes, following
 
 
@@ -49,4 +49,4 @@ class Lead:
         times = self.period * np.arange(len(self.points))
         t = moments(seconds)
         points = np.stack([np.interp(t, times, self.points[:, k]) for k in range(3)], axis=1)
-        return Wishes(following(points), PERIOD)
+        return Wishes(following(points), WISH_PERIOD)

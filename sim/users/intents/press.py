@@ -9,7 +9,7 @@ from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from sim.errors import SimError
 from sim.users.hand.actions import Push
-from sim.users.intents.intent import PERIOD, centre, moments
+from sim.users.intents.intent import WISH_PERIOD, centre, moments
 from sim.users.person.wishes import FORCE, Wishes, resting
 
 
@@ -47,4 +47,4 @@ class Press:
             phase = np.clip((t - push.at) / push.seconds, 0.0, 1.0)
             direction = outward if push.direction is None else np.array(push.direction) / np.linalg.norm(push.direction)
             rows[:, FORCE : FORCE + 3] += (push.force * np.sin(np.pi * phase) ** 2)[:, None] * direction
-        return Wishes(rows, PERIOD, curve.duration)
+        return Wishes(rows, WISH_PERIOD, curve.duration)

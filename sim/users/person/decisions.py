@@ -39,7 +39,7 @@ from sim.users.person.wishes import GRIP as WISHED_GRIP
 
 ENGAGING_TIME = 0.1  # [s] time constant of muscle activation: electromechanical delay and rise
 YIELDING_TIME = 0.15  # [s] time constant with which a relaxed arm's rest position follows the hand
-RETAINED = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
+RETENTION = 0.99  # A, share of what was learned that is retained per repetition: slow process of Smith et al. 2006 (m)
 # [s] half-width of the velocity difference that estimates a path's acceleration: a third of a submovement
 DIFFERENCE_HALF_WIDTH = 0.1
 
@@ -143,7 +143,7 @@ def _learn_force(person: PersonState, wanted: Array) -> None:
         pull = 0.0
         for j in range(3):
             pull += person.stiffness[k, j] * (wanted[0, j] - V[BELIEF, j])
-        person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETAINED) * person.learned[part, k])
+        person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETENTION) * person.learned[part, k])
         V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[activated_part, k]
 
 

@@ -21,7 +21,7 @@ from numba import njit
 from geometry.arrays import Array
 from geometry.rotations import logarithm, relative
 
-LOOKS = 0.008  # [s] between two images of the figure: about 120 a second
+IMAGE_INTERVAL = 0.008  # [s] between two images of the figure: about 120 a second
 _SEARCH_FRACTION = 1.0 / 8.0  # of the motion, around the felt place, searched for a pose: steps of a gait look alike
 
 

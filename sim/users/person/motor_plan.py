@@ -30,10 +30,10 @@ from sim.users.person.random_numbers import normal
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.person.wishes import PLACE
 
-ACROSS = 0.85  # endpoint scatter across the direction over that along it (< 1: Gordon et al. 1994 I; value from memory)
+CROSS_SCATTER = 0.85  # endpoint scatter across over along the direction (< 1: Gordon et al. 1994 I; value from memory)
 MIN_SUBMOVEMENT_TIME = 0.16  # [s] duration of the shortest submovement
-WATCHED = 0.8  # share of a submovement's duration (94 % of its length) after which its endpoint can be seen
-SURPRISE, REACTION = 0.004, 0.08  # deviation from the plan that is corrected [m], and the delay [s]
+SEEN_FRACTION = 0.8  # share of a submovement's duration (94 % of its length) after which its endpoint can be seen
+MAX_DEVIATION, REACTION_TIME = 0.004, 0.08  # deviation from the plan that is corrected [m], and the delay [s]
 
 
 @njit
@@ -48,7 +48,7 @@ def may_decide(person: PersonState, waits: bool) -> bool:
         return False
     elapsed = now - m[BEGUN]
     if waits:
-        return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], WATCHED * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
+        return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], SEEN_FRACTION * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
     if m[LASTS] == 0.0 or elapsed >= m[LASTS]:
         return True
     believed = work_array((3, 3))
@@ -56,9 +56,9 @@ def may_decide(person: PersonState, waits: bool) -> bool:
     squared_deviation = 0.0
     for k in range(3):
         squared_deviation += (V[BELIEF, k] - believed[0, k]) ** 2
-    if squared_deviation < SURPRISE * SURPRISE:
+    if squared_deviation < MAX_DEVIATION * MAX_DEVIATION:
         m[CALM] = now
-    return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION
+    return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION_TIME
 
 
 @njit
@@ -88,9 +88,9 @@ def aim(person: PersonState, goal: Array, width: float) -> bool:
 def submove(person: PersonState, goal: Array, seconds: float) -> None:
     r"""Begin a submovement from the believed place of the hand to a goal.
 
-    Its endpoint scatters with σ = K A/D along its direction and less across (`ACROSS`), A its length and D its duration
-    (Schmidt et al. 1979; ellipses of endpoints: Gordon et al. 1994), because the noise of a motor command grows with
-    the command (Harris & Wolpert 1998).
+    Its endpoint scatters with σ = K A/D along its direction and less across (`CROSS_SCATTER`), A its length and D its
+    duration (Schmidt et al. 1979; ellipses of endpoints: Gordon et al. 1994), because the noise of a motor command
+    grows with the command (Harris & Wolpert 1998).
     """
     n, m, V = person.numbers, person.memory, person.vectors
     start, end, displacement, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
@@ -102,7 +102,7 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     start[0], start[1], start[2] = V[BELIEF], V[DRIVEN_V], V[DRIVEN_A]
     set_submovement(person.plans[1], start, goal, seconds)
     scatter = n[MOTOR_NOISE] * length / seconds
-    across = ACROSS * scatter
+    across = CROSS_SCATTER * scatter
     along = math.sqrt(scatter * scatter - across * across) * normal(person.chance)
     for k in range(3):
         unit = displacement[k] / length if length > 0.0 else 0.0

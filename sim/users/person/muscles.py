@@ -34,9 +34,9 @@ from sim.users.person.person_state import (
     PersonState,
 )
 
-SLACK, LOOSE = 0.08, 0.3  # shares of stiffness and damping that a relaxed arm keeps: passive tissue
-RECOVERY = 0.04  # R [1/min] of fatigued muscle, for grip (Frey-Law et al. 2012, m)
-RESTED, RESTING = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m); share of strength below which a muscle rests
+PASSIVE_STIFFNESS, PASSIVE_DAMPING = 0.08, 0.3  # shares of both that a relaxed arm keeps: passive tissue
+RECOVERY_RATE = 0.04  # R [1/min] of fatigued muscle, for grip (Frey-Law et al. 2012, m)
+REST_FACTOR, MAX_REST_LOAD = 15.0, 0.05  # factor on R at rest (Looft et al. 2018, m), below this share of strength
 
 
 @njit
@@ -47,8 +47,8 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
     """
     n, m, V = person.numbers, person.memory, person.vectors
     engaged, stiffer = m[ENGAGED_SHARE], m[STIFFNESS_FACTOR]
-    spring = stiffer * (SLACK + (1.0 - SLACK) * engaged) * (1.0 - n[REFLEX_GAIN])
-    damper = math.sqrt(stiffer) * (LOOSE + (1.0 - LOOSE) * engaged) * (1.0 - n[REFLEX_GAIN])
+    spring = stiffer * (PASSIVE_STIFFNESS + (1.0 - PASSIVE_STIFFNESS) * engaged) * (1.0 - n[REFLEX_GAIN])
+    damper = math.sqrt(stiffer) * (PASSIVE_DAMPING + (1.0 - PASSIVE_DAMPING) * engaged) * (1.0 - n[REFLEX_GAIN])
     muscle, size, force_size = work_array(3), 0.0, 0.0
     for k in range(3):
         component = V[WANTED_FORCE, k] + engaged * V[REFLEX, k]
@@ -80,5 +80,5 @@ def move(person: PersonState, dt: float, p: Array, v: Array, force: Array) -> No
         V[HAND_P, k] += dt * V[HAND_V, k]
     if n[FATIGUE] > 0.0:
         load = min(size, max_force) / n[STRENGTH]
-        recovery = RECOVERY * (RESTED if load < RESTING else 1.0)
+        recovery = RECOVERY_RATE * (REST_FACTOR if load < MAX_REST_LOAD else 1.0)
         m[CAPACITY] += dt / 60.0 * (recovery * (1.0 - m[CAPACITY]) - n[FATIGUE] * load)

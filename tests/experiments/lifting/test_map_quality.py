@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from experiments.lifting.map_quality import (
-    SAMPLES,
+    N_SAMPLES,
     Layout,
     body_weights,
     in_between,
@@ -53,8 +53,8 @@ def rows(moves, turns):
 
 def layout(derivative, sites, durations=None):
     sites = np.asarray(sites, dtype=float)
-    sites = np.tile(sites, (SAMPLES, 1, 1)) if sites.ndim == 2 else sites
-    share = np.arange(SAMPLES + 1)[:, None] / SAMPLES
+    sites = np.tile(sites, (N_SAMPLES, 1, 1)) if sites.ndim == 2 else sites
+    share = np.arange(N_SAMPLES + 1)[:, None] / N_SAMPLES
     durations = np.ones(sites.shape[1]) if durations is None else durations
     names = tuple(f"clip {i}" for i in range(sites.shape[1]))
     return Layout(KnownMap(derivative), names, sites, share * durations)
@@ -79,10 +79,10 @@ def test_joint_weights_match_the_mass_matrix():
 
 
 def test_separation_is_the_least_distance_at_equal_angles():
-    angles = TURN * np.arange(SAMPLES) / SAMPLES
-    fixed = np.tile([0.05, 0.0], (SAMPLES, 1))
+    angles = TURN * np.arange(N_SAMPLES) / N_SAMPLES
+    fixed = np.tile([0.05, 0.0], (N_SAMPLES, 1))
     # Nearest at 90°, where the other is at (0.062, 0.005); smaller distances between different angles do not count.
-    other = np.stack([0.072 - 0.01 * np.sin(angles), 0.005 * np.ones(SAMPLES)], axis=1)
+    other = np.stack([0.072 - 0.01 * np.sin(angles), 0.005 * np.ones(N_SAMPLES)], axis=1)
     quality = measured(layout(lambda p: rows(np.eye(3), np.zeros((3, 3))), np.stack([fixed, other], axis=1)))
     assert quality.separation == pytest.approx(np.hypot(0.012, 0.005), rel=1e-9)
 
@@ -138,14 +138,14 @@ def test_lap_times_of_closed_clip_match_frame_angles(start):
     def share_at(angle):
         return brentq(lambda s: start + TURN * (s + 0.1 * np.sin(TURN * s)) - angle, -2.0, 2.0)
 
-    expected = duration * np.array([share_at(angle) - share_at(0.0) for angle in np.linspace(0.0, TURN, SAMPLES + 1)])
+    expected = duration * np.array([share_at(angle) - share_at(0.0) for angle in np.linspace(0.0, TURN, N_SAMPLES + 1)])
     np.testing.assert_allclose(times, expected, atol=1e-6)
 
 
 def test_lap_times_of_open_clip_cross_the_gap_at_constant_rate():
     # 5 rad in 2 s, so the lap takes as long as at that pace.
     times = lap_times(0.5 + 5.0 * np.linspace(0.0, 1.0, 50), 2.0)
-    np.testing.assert_allclose(times, 2.0 / 5.0 * np.linspace(0.0, TURN, SAMPLES + 1), atol=1e-12)
+    np.testing.assert_allclose(times, 2.0 / 5.0 * np.linspace(0.0, TURN, N_SAMPLES + 1), atol=1e-12)
 
 
 def moved(**changes):

@@ -18,7 +18,7 @@ def captures(monkeypatch):
     """The folder; runs are shortened to 6 s, a lap and most of the second one, in which the hand pushes."""
     if not MOCAP.is_dir():
         pytest.skip("no motion capture at ../shared/mocap")
-    monkeypatch.setattr(random_sets, "SECONDS", 6.0)
+    monkeypatch.setattr(random_sets, "RUN_SECONDS", 6.0)
     monkeypatch.setattr(random_sets, "followed", lambda clip: followed(clip, 6.0))
     return str(MOCAP)
 

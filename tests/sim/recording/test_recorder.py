@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from sim.recording.recorder import CHUNK_SECONDS, PAGE, DiskFull, Group, Recorder
+from sim.recording.recorder import CHUNK_SECONDS, PAGE_SIZE, DiskFull, Group, Recorder
 from sim.recording.recording import Recording, RecordingError
 from sim.recording.unclosed import lookup3
 
@@ -151,7 +151,7 @@ def test_hdf5_structures_do_not_cross_pages(tmp_path):
     content = (tmp_path / "run.h5").read_bytes()
     begins = [(match.start(), sizes[match[0]]) for match in re.finditer(b"OHDR|EAHD|EAIB|EADB", content)]
     assert len(begins) > 40
-    assert all(begin // PAGE == (begin + size) // PAGE for begin, size in begins)
+    assert all(begin // PAGE_SIZE == (begin + size) // PAGE_SIZE for begin, size in begins)
 
 
 def test_exception_keeps_all_rows_and_marks_the_recording_incomplete(tmp_path):

@@ -147,7 +147,7 @@ def test_replay_lasts_as_long_as_the_run_or_its_shown_part(tmp_path, model, monk
         assert content["durationSeconds"] == pytest.approx(1.0, abs=1 / 30)
         times = [when for when, _ in content["messages"]]
         assert times == sorted(times)
-        monkeypatch.setattr(module, "SECONDS", 0.5)
+        monkeypatch.setattr(module, "MAX_SECONDS", 0.5)
         assert decoded(replay_html(recording, model))["durationSeconds"] == pytest.approx(0.5)
 
 

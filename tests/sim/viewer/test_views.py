@@ -8,7 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim.viewer.views import FIELD_OF_VIEW, PANEL, SHEET, VIEWS, View, camera_of, is_phone, look, open_with, screen_axes
+from sim.viewer.views import (
+    FIELD_OF_VIEW,
+    PANEL_WIDTH,
+    SHEET_SHARE,
+    VIEWS,
+    View,
+    camera_of,
+    is_phone,
+    look,
+    open_with,
+    screen_axes,
+)
 
 
 def projected_points(view: View, width: float, height: float) -> np.ndarray:
@@ -32,7 +43,7 @@ def projected_points(view: View, width: float, height: float) -> np.ndarray:
 @pytest.mark.parametrize("name", VIEWS)
 def test_view_fills_the_space_beside_the_panel(name: str, size: tuple[int, int]) -> None:
     width, height = size
-    free = (width, (1.0 - SHEET) * height) if is_phone(width, height) else (width - PANEL, height)
+    free = (width, (1.0 - SHEET_SHARE) * height) if is_phone(width, height) else (width - PANEL_WIDTH, height)
     pixels = projected_points(VIEWS[name], *size)
     np.testing.assert_allclose(pixels[0], [0.5 * free[0], 0.5 * free[1]], atol=1e-6)
     inside = (pixels > -1e-6) & (pixels < np.array(free) + 1e-6)

@@ -13,7 +13,7 @@ from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
 from controllers.certificates.switching.switching import HandRetention, SelectionRule, hysteresis_dwell, switching
-from controllers.certificates.switching.switching_search import SECONDS, Course, Push, counterexample, failure
+from controllers.certificates.switching.switching_search import SEARCH_TIME, Course, Push, counterexample, failure
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
@@ -50,7 +50,7 @@ def _found_counterexample(field, clock, newtons):
 
 def _simulated_counterexample(field, clock, found):
     push = Push(found["force"], found["push_start"], found["push_duration"])
-    return simulated_course(field, clock, found["p"], found["v"], SECONDS, push)
+    return simulated_course(field, clock, found["p"], found["v"], SEARCH_TIME, push)
 
 
 def test_common_lyapunov_function_is_confirmed_by_eigenvalues():

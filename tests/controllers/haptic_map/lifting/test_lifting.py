@@ -8,9 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting.arrangement import ROWS, SAMPLES, Energy, Task, arrange, evaluate_sites, is_apart
-from controllers.haptic_map.lifting.common_lap import SAMPLES as STEPS
-from controllers.haptic_map.lifting.common_lap import common_lap
+from controllers.haptic_map.lifting.arrangement import N_ANGLES, N_ROWS, Energy, Task, arrange, evaluate_sites, is_apart
+from controllers.haptic_map.lifting.common_lap import N_SAMPLES, common_lap
 from controllers.haptic_map.lifting.layouts import lattice, scaled
 from controllers.haptic_map.lifting.lift import lift
 from controllers.haptic_map.lifting.motion_features import Features, Motion, features
@@ -75,7 +74,7 @@ def test_feature_velocities_match_differences_of_poses():
 
 def test_common_lap_removes_a_phase_shift():
     clips = [motion(swinging(5), "a"), motion(swinging(5, phase=0.3), "b")]
-    a, b = common_lap(clips, [features(m, WEIGHTS, STEPS) for m in clips])
+    a, b = common_lap(clips, [features(m, WEIGHTS, N_SAMPLES) for m in clips])
     # b at share s is a at s + 0.3.
     lag = np.mod(a.share(np.array([0.2])) - b.share(np.array([0.2])), 1.0)
     assert lag == pytest.approx(0.3, abs=0.5 / 96)
@@ -88,7 +87,7 @@ def test_common_lap_removes_a_time_warp():
     warped = np.stack([np.interp(late, s, column) for column in even.T], axis=1)
     warped[:, 3:] /= np.repeat(np.linalg.norm(warped[:, 3:].reshape(201, -1, 4), axis=2), 4, axis=1)
     clips = [motion(even, "even"), motion(warped, "late")]
-    a, b = common_lap(clips, [features(m, WEIGHTS, STEPS) for m in clips])
+    a, b = common_lap(clips, [features(m, WEIGHTS, N_SAMPLES) for m in clips])
     lap = np.arange(96) / 96
     error = np.interp(np.mod(b.share(lap), 1.0), s, late) - np.mod(a.share(lap), 1.0)
     error -= np.round(error)
@@ -104,7 +103,7 @@ def test_common_lap_aligns_clips_by_contacts_where_poses_are_equal():
     for name, lead in (("a", 0.0), ("b", 0.35)):
         left = np.mod(s + lead, 1.0) < 0.5
         walks.append(motion(still, name, supports=np.stack([left, ~left], axis=1)))
-    a, b = common_lap(walks, [features(m, WEIGHTS, STEPS) for m in walks])
+    a, b = common_lap(walks, [features(m, WEIGHTS, N_SAMPLES) for m in walks])
     lap = np.arange(96) / 96
     stands = [np.mod(phase.share(lap) + lead, 1.0) < 0.5 for phase, lead in ((a, 0.0), (b, 0.35))]
     assert np.mean(stands[0] == stands[1]) > 0.97
@@ -141,7 +140,7 @@ def clips_that_meet_once():
 def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_there():
     found = lifted_at(clips_that_meet_once())
     (transition,) = found.transitions
-    base = common_lap([clips_that_meet_once()[0]], [features(clips_that_meet_once()[0], WEIGHTS, STEPS)])[0]
+    base = common_lap([clips_that_meet_once()[0]], [features(clips_that_meet_once()[0], WEIGHTS, N_SAMPLES)])[0]
     assert base.start == 0.0
     assert np.hypot(transition.pose, transition.velocity) < 0.1
     assert transition.support == 0.0
@@ -193,16 +192,16 @@ def test_motions_that_never_agree_have_no_transition():
 def test_energy_gradient_matches_finite_differences():
     rng = np.random.default_rng(0)
     n = 4
-    distance = 0.1 * np.abs(rng.normal(size=(SAMPLES, n, n)))
+    distance = 0.1 * np.abs(rng.normal(size=(N_ANGLES, n, n)))
     distance = distance + distance.transpose(0, 2, 1)
     # The limits are low enough to be exceeded.
     task = Task(
         Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 0.1, 0.5, distance,
         [Transition(0, 1, 1.0, 0.0, 0.0, 0.0, (0.0, 0.0)), Transition(1, 2, 3.0, 0.0, 0.0, 0.0, (0.0, 0.0))],
-        6.0 + rng.normal(size=(SAMPLES, n)), rng.normal(size=(SAMPLES, n)),
+        6.0 + rng.normal(size=(N_ANGLES, n)), rng.normal(size=(N_ANGLES, n)),
     )  # fmt: skip
     energy = Energy(task)
-    start = np.tile(scaled(task.scale * distance.mean(axis=0), np.arange(4.0), task.rectangle), (ROWS, 1, 1))
+    start = np.tile(scaled(task.scale * distance.mean(axis=0), np.arange(4.0), task.rectangle), (N_ROWS, 1, 1))
     x = (start + 2e-3 * rng.normal(size=start.shape)).ravel()
     gradient = energy(x)[1]
     for _ in range(5):
@@ -253,11 +252,11 @@ def test_acceleration_limit_keeps_fast_clips_where_the_device_can_follow():
 
 def test_faster_curves_bend_less():
     # Two motions that are alike twice a lap.
-    lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, SAMPLES, endpoint=False))
+    lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, N_ANGLES, endpoint=False))
     distance = lap[:, None, None] * (1.0 - np.eye(2))
     bends = list[float]()
     for rate in (1.0, 3.0, 9.0):
-        still = np.zeros((SAMPLES, 2))
+        still = np.zeros((N_ANGLES, 2))
         task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
         bends.append(np.ptp(arrange(task, np.random.default_rng(0))[0], axis=0).max())
     assert bends[0] > 3e-3
@@ -345,11 +344,11 @@ def test_impossible_lifts_raise_parameter_error_with_a_remedy(make, message):
 def test_is_apart_detects_curves_that_come_too_close():
     """The check on which `arrange` relies."""
     task = Task(
-        Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 1.0, 8.0, np.ones((SAMPLES, 2, 2)), [],
-        np.ones((SAMPLES, 2)), np.zeros((SAMPLES, 2)),
+        Rectangle(0.02, 0.07, -0.05, 0.05), 0.01, 0.002, 1.0, 8.0, np.ones((N_ANGLES, 2, 2)), [],
+        np.ones((N_ANGLES, 2)), np.zeros((N_ANGLES, 2)),
     )  # fmt: skip
-    controls = np.tile(np.array([[0.03, 0.0], [0.05, 0.0]]), (ROWS, 1, 1))
+    controls = np.tile(np.array([[0.03, 0.0], [0.05, 0.0]]), (N_ROWS, 1, 1))
     assert is_apart(task, controls)
     controls[10:20, 1, 0] = 0.035
     assert not is_apart(task, controls)
-    assert evaluate_sites(controls)[0].shape == (SAMPLES, 2, 2)
+    assert evaluate_sites(controls)[0].shape == (N_ANGLES, 2, 2)

@@ -5,8 +5,8 @@ import pytest
 from scipy import signal
 
 from experiments.results.measures.smoothness import (
-    CUTOFF,
-    RATE,
+    SPEED_RATE,
+    VELOCITY_CUTOFF,
     log_dimensionless_jerk,
     spectral_arc_length,
     speed_profile,
@@ -33,7 +33,7 @@ def test_smoothness_is_invariant_to_amplitude_and_duration(measure) -> None:
 
 def test_sparc_of_one_reach_is_published_value_and_falls_with_submovements() -> None:
     # Balasubramanian et al. 2015: about −1.4 for a single minimum-jerk movement, less with each added one.
-    values = [spectral_arc_length(np.concatenate([reach(0.5)] * n), RATE) for n in (1, 2, 4, 8)]
+    values = [spectral_arc_length(np.concatenate([reach(0.5)] * n), SPEED_RATE) for n in (1, 2, 4, 8)]
     assert values[0] == pytest.approx(-1.4, abs=0.1)
     assert values == sorted(values, reverse=True)
 
@@ -42,14 +42,14 @@ def test_tremor_lowers_both_smoothness_measures() -> None:
     t = np.arange(0.0, 2.0, 0.01)
     shaken = reach(2.0) + 0.3 * (1.0 + np.sin(2.0 * np.pi * 9.0 * t))
     for measure in (spectral_arc_length, log_dimensionless_jerk):
-        assert measure(shaken, RATE) < measure(reach(2.0), RATE) - 0.2
+        assert measure(shaken, SPEED_RATE) < measure(reach(2.0), SPEED_RATE) - 0.2
 
 
 def test_speed_profile_equals_zero_phase_butterworth() -> None:
     rate = 1000.0
     velocity = np.cumsum(np.random.default_rng(1).normal(size=(3000, 3)), axis=0) * 1e-3
-    smooth = signal.sosfiltfilt(signal.butter(2, CUTOFF, fs=rate, output="sos"), velocity, axis=0)
-    expected = np.linalg.norm(smooth[:: round(rate / RATE)], axis=1)
+    smooth = signal.sosfiltfilt(signal.butter(2, VELOCITY_CUTOFF, fs=rate, output="sos"), velocity, axis=0)
+    expected = np.linalg.norm(smooth[:: round(rate / SPEED_RATE)], axis=1)
     assert speed_profile(velocity, rate) == pytest.approx(expected, abs=0.01 * expected.max())
 
 
@@ -63,5 +63,5 @@ def test_speed_profile_removes_encoder_noise() -> None:
 
 
 def test_smoothness_of_resting_hand() -> None:
-    assert np.isnan(log_dimensionless_jerk(np.zeros(100), RATE))
-    assert spectral_arc_length(np.zeros(100), RATE) == 0.0
+    assert np.isnan(log_dimensionless_jerk(np.zeros(100), SPEED_RATE))
+    assert spectral_arc_length(np.zeros(100), SPEED_RATE) == 0.0

@@ -15,7 +15,7 @@ from sim.users.intents import Own, Trace, Wish
 from sim.users.participant import Participant
 from sim.users.person.body import arm_matrices
 from sim.users.person.eye import Eye, seen_place
-from sim.users.person.muscles import RECOVERY
+from sim.users.person.muscles import RECOVERY_RATE
 from sim.users.person.person import Person
 from sim.users.person.person_state import (
     BELIEF,
@@ -133,7 +133,7 @@ def test_held_force_tires_by_the_three_compartment_model() -> None:
     began, load = hand.state.memory[CAPACITY], float(np.linalg.norm(hand.force)) / person.strength
     hand.hold(np.array([0.04, 0.0, 0.0]), 3.0)
     assert 0.2 < load < 0.9
-    lost = 4.0 * load / RECOVERY * (1.0 - np.exp(-RECOVERY * 3.0 / 60.0))
+    lost = 4.0 * load / RECOVERY_RATE * (1.0 - np.exp(-RECOVERY_RATE * 3.0 / 60.0))
     assert began - hand.state.memory[CAPACITY] == pytest.approx(lost, rel=0.02)
 
 
