@@ -28,7 +28,8 @@ CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "xia" / "strutting_01
 
 @pytest.fixture(scope="module")
 def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedPage]:
-    page = ServedPage(run_config(mode="stretch", figure="kinematic", seconds=3600.0), tmp_path_factory.mktemp("live"))
+    config = run_config(mode="stretch", figure="kinematic", cutoff=149.0, seconds=3600.0)
+    page = ServedPage(config, tmp_path_factory.mktemp("live"))
     yield page
     page.close()
 
@@ -188,11 +189,12 @@ def test_takes_are_recorded_downloaded_compared_and_mixed(tab: Any, served: Serv
     served.assert_until(lambda: not served.page._takes.compares, "the default animation is back")
 
 
-def test_mode_is_switched(tab: Any, served: ServedPage) -> None:
+def test_mode_is_switched_on_the_same_device(tab: Any, served: ServedPage) -> None:
     tab.get_by_role("tab", name="Play").click()
     choose(tab, "Mode", "follow")
     tab.get_by_role("button", name="Run this").click()
     served.assert_until(lambda: served.desk.built.config.mode.kind == "follow", "it runs")
+    assert served.desk.built.config.device.cutoff == 149.0
     tab.get_by_label("Grab and bend").wait_for(state="detached")
     save_screenshot(tab, "follow")
 

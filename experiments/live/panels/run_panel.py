@@ -1,6 +1,7 @@
 """Panels of the live page for the choice of mode, map, figure and clips, and for uploading a motion file."""
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import viser
@@ -31,11 +32,12 @@ class RunPanel:
     Parameters
     ----------
     config : RunConfig
-        The initial choice.
+        The initial choice; its device and rates are those of every run.
     """
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, config: RunConfig):
         self._gui, self._desk, self._acts = gui, desk, acts
+        self._device, self._clock = config.device, config.clock
         modes = tuple(mode.__pydantic_fields__["kind"].default for mode in MODES)  # pyright: ignore
         maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS if kind is not RobotArm)  # pyright: ignore
         self._file = config.map.file if isinstance(config.map, MapFile) else ""
@@ -63,19 +65,13 @@ class RunPanel:
         ParameterError
             If its parts do not fit.
         """
-        mode = str(self._mode.value)
-        options: dict[str, Any] = {
-            "figure": str(self._figure.value),
-            "seconds": MAX_SESSION_DURATION,
-            "clips": self._clip_names(),
-        }
-        if mode == "lead":
-            return run_config(mode=mode, **options)
-        map_kind = str(self._map.value)
-        if map_kind == "file":
-            del options["clips"]
-            return run_config(mode=mode, map=self._file, **options)
-        return run_config(mode=mode, map=map_kind, **options)
+        mode, map_kind = str(self._mode.value), str(self._map.value)
+        options: dict[str, Any] = {"figure": str(self._figure.value), "seconds": MAX_SESSION_DURATION}
+        if mode != "lead" and map_kind == "file":
+            options["map"] = self._file
+        else:
+            options |= {"map": "" if mode == "lead" else map_kind, "clips": self._clip_names()}
+        return replace(run_config(mode=mode, **options), device=self._device, clock=self._clock)
 
     def show(self, built: Built) -> None:
         """Set the choice to the current run."""
