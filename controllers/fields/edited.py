@@ -23,9 +23,8 @@ from controllers.work_array import work_array
 from geometry.arrays import Array
 
 _NEAREST, _PERFORMANCE_TIME, _LAST_TIME, _MEMORY_SIZE = range(4)  # t* of φ', s, time of the last tick [s]
-_SAMPLE_INTERVAL = (
-    0.01  # [s] of a performance: short compared with hand motion, long enough to limit quantisation noise
-)
+# [s] of a performance: short compared with hand motion, long enough to limit quantisation noise
+_SAMPLE_INTERVAL = 0.01
 
 
 @njit

@@ -25,9 +25,8 @@ from controllers.walking.walker import (
 from geometry.arrays import Array
 from geometry.physics import GRAVITY
 
-_PENDULUM_HEIGHT = (
-    1.0  # [m] height of the linear inverted pendulum that models the lean; the centre of mass stands at 1.02
-)
+# [m] height of the linear inverted pendulum that models the lean; the centre of mass stands at 1.02
+_PENDULUM_HEIGHT = 1.0
 _PREVIEW_RATIO = 1.5  # preview of the path, in distances over which the pendulum falls by a factor of e
 
 

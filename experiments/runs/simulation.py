@@ -21,7 +21,7 @@ from controllers.safety.limiter import ForceLimiter
 from controllers.state import HandState, Wrench, stylus_path
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_dict
-from experiments.config.run_config import REPLAY_WITH_USER, Clock, Figure, Phantom, Replay, check_seed
+from experiments.config.run_config import DEFAULT_SEED, REPLAY_WITH_USER, Clock, Figure, Phantom, Replay, check_seed
 from experiments.config.run_config import User as RunUser
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
@@ -179,7 +179,7 @@ class Simulation:
     device: Phantom | Replay = Phantom()  # noqa: RUF009 - frozen
     figure: Figure = Figure()  # noqa: RUF009
     clock: Clock = Clock()  # noqa: RUF009
-    seed: int = 1
+    seed: int = DEFAULT_SEED
     tank: EnergyTank | None = None
 
     @with_keyword_messages()

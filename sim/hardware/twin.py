@@ -7,8 +7,8 @@ torques; the encoders then correct it, as in a Luenberger observer with a double
           \quad e = \theta - \theta^-
 
 The hand's torques τ_h are estimated by a generalised-momentum observer (De Luca & Mattone, ICRA 2005; De Luca et al.,
-IROS 2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f_c
-\tanh(\dot\theta/\epsilon) + \tau_h`,
+IROS 2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f
++ \tau_h`, f = f_c tanh(θ̇/ε),
 
 .. math:: r = K \left(p(t) - p(0) - \int (\tau + C^T\dot\theta - N - D\dot\theta - f + r)\,dt\right),
           \qquad \dot r = K (\tau_h - r)

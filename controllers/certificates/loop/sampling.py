@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from controllers.errors import ParameterError
 
-MAX_DELAY_PERIODS = (
-    128  # of a delay: each adds three states to the loop, and the time for its eigenvalues grows cubically
-)
+# Largest delay: each period adds three states to the loop, and the time for its eigenvalues grows cubically.
+MAX_DELAY_PERIODS = 128
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ from controllers.curves.trajectory import Trajectory
 from geometry.arrays import Array, Mask
 
 _MIN_STIFFNESS = 1e-3  # [N/m] at which the search for a critical gain begins
-GAIN_GRID = (
-    40  # gains of the grid before bisection; half or twice as many find the same critical gains along a curved path
-)
+# gains of the grid before bisection; half or twice as many find the same critical gains along a curved path
+GAIN_GRID = 40
 # Phases of the curve at which the loop is examined; with eight times as many, critical gains are 0.1 % lower.
 N_PHASES = 48
 _FINE_PHASE_COUNT = 4000  # phases at which properties of the curve alone are evaluated, as in `region.remainder`

@@ -81,7 +81,7 @@ class Desk:
             self._process_answer(answer)
         while (verdict := self._verdicts.answer()) is not None:
             config, now, is_pending = verdict
-            if self.config is not None and config.mode == self.config.mode:
+            if config == self.config:
                 self.verdict, self.checking = now, is_pending
         if self._preparation is not None and (uploaded := self._preparation.answer()) is not None:
             self._add_clip(uploaded)

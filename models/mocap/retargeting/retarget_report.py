@@ -36,9 +36,8 @@ _MIN_DEPTH = 0.1  # least depth below the floor that is reported [m]: in the sam
 # Legs of a human, hip to ankle [m]: 0.49 of an adult's stature (Winter 2009, figure 4.1), 1.33 m for the tallest known;
 # about 0.3 m for a child that begins to walk. Wrong units are off by factors above 2, so the bounds may be wide.
 _MIN_LEG_LENGTH, _MAX_LEG_LENGTH = 0.3, 1.5
-MIN_FRAME_RATE = (
-    10.0  # [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
-)
+# [1/s] frame rate below which a remark is made: motion is captured at 24 frames a second and more
+MIN_FRAME_RATE = 10.0
 # Speed of an ankle relative to its hip [m/s] that no leg exceeds for a tenth of a capture, and the quantile: 8 in a
 # file of a kick, 15 in the fastest of some 450 captures, an estimate from video; a walk has 3.
 _MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
