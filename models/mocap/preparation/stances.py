@@ -47,6 +47,7 @@ _REST_TIME = 0.1  # time at both ends of an open clip in which both feet stand [
 _HOLD_FADE_TIME = 0.05
 # Least height of the root at such an end [m]: a crawling or lying body is supported differently.
 _MIN_UPRIGHT_HEIGHT = 0.55
+_FILLED_GAP_TIME = 0.03  # support for less than this within a span without support does not divide the span [s]
 _N_SOLES = len(FOOT_CONTACTS)
 
 
@@ -239,7 +240,7 @@ def _sphere_mask(parts: Mask) -> Mask:
 def _is_unsupported(parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
     """Whether nothing stands although the body is under load, shape (n,)."""
     stands = parts.any(axis=(1, 2)) | hands.any(axis=1)
-    return cleaned(~stands & (load > MIN_LOAD), round(0.03 * fps), 2)
+    return cleaned(~stands & (load > MIN_LOAD), round(_FILLED_GAP_TIME * fps), 2)
 
 
 def _sliding_spheres(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
