@@ -32,7 +32,8 @@ def practice(people: Sequence[Person], seed: int) -> Study:
     angle, n = 2.0 * np.pi * t / LAP_DURATION, round(N_LAPS * LAP_DURATION / PERIOD)
     points = RADIUS * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     phase = 2.0 * np.pi * PERIOD * np.arange(n) / LAP_DURATION
-    pushes: Array = PUSH_FORCE * np.stack([np.cos(2.0 * phase), np.sin(2.0 * phase), 0.0 * phase], axis=1)
+    pushes = np.stack([np.cos(2.0 * phase), np.sin(2.0 * phase), 0.0 * phase], axis=1, dtype=np.float64)
+    pushes *= PUSH_FORCE
     wanted = RADIUS * np.stack([np.cos(phase), np.sin(phase), 0.0 * phase], axis=1)
     curves = list[Array]()
     for i, person in enumerate(people):
