@@ -81,9 +81,7 @@ def stored_limbs(arrays: Mapping[str, Array]) -> list[Limb]:
             raise ParameterError(f"'{key}joints' of the map must be finite, got {joints}")
         first, second, last = (int(joint) for joint in joints)
         offsets, axis = stored_array(arrays, f"{key}offsets", (3, 3)), stored_array(arrays, f"{key}axis", (3,))
-        points, limits = (
-            stored_array(arrays, f"{key}points", (None, 3)),
-            stored_array(arrays, f"{key}limits", (3, 3, 2)),
-        )
+        points = stored_array(arrays, f"{key}points", (None, 3))
+        limits = stored_array(arrays, f"{key}limits", (3, 3, 2))
         limbs.append(Limb((first, second, last), offsets, axis, points, limits))
     return limbs

@@ -221,11 +221,7 @@ def commit(record: Array, at: int) -> None:
 
     If the table is full, the oldest edit becomes part of the base curve and can no longer be undone.
     """
-    table, committed, base = (
-        at + int(record[at + TABLE]),
-        at + int(record[at + COMMITTED]),
-        at + int(record[at + BASE]),
-    )
+    table, committed, base = at + int(record[at + TABLE]), at + int(record[at + COMMITTED]), at + int(record[at + BASE])
     _add_bump(record, at, at + PENDING, committed, committed)
     count = int(record[at + COUNT])
     if count == int(record[at + DEPTH]):

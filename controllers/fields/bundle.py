@@ -93,8 +93,6 @@ class RiverBundle(Law):
             if numbers.shape != (5,):
                 raise ParameterError(f"river {name!r} of the bundle has {numbers.size} numbers, expected 5")
             epsilon, tau, drag, periodic, clamped = cast("list[float]", numbers.tolist())
-            curve = Trajectory(
-                times, positions, quaternions, periodic != 0.0, "clamped" if clamped else "natural"
-            )  # fmt: skip
+            curve = Trajectory(times, positions, quaternions, periodic != 0.0, "clamped" if clamped else "natural")
             rivers.append(River(curve, epsilon, tau, drag, speeds if len(speeds) else None))
         return RiverBundle(tuple(rivers), names)

@@ -51,9 +51,7 @@ _GAINS_SIZE = len(RecordedGains._fields)
 @njit
 def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
     """Kernel of a performance: parameters `RecordedGains` and φ', memory see `_NEAREST`."""
-    gains = RecordedGains(
-        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
-    )  # fmt: skip
+    gains = RecordedGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
     p, performed = hand[HAND_POSITION : HAND_POSITION + 3], at + _GAINS_SIZE
     inverse_square, start, end = gains.inverse_square, params[performed + START], params[performed + END]
     s, time = hand[HAND_TIME], hand[HAND_TIME]

@@ -68,9 +68,7 @@ def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int,
         # A value that is not finite must reach the limiter.
         wrench[:3] = np.nan
         return
-    gains = LeadingGains(
-        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5]
-    )  # fmt: skip
+    gains = LeadingGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
     walker, scale = followed_at(memory, slot), gains.scale
     c, s = np.cos(walker.heading), np.sin(walker.heading)
     wrench[0], wrench[1] = leading_force(

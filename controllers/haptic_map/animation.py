@@ -32,11 +32,7 @@ class ClipMap(KernelMap):
     """
 
     def __init__(
-        self,
-        params: Array,
-        clips: Sequence[tuple[Array, float]],
-        names: Sequence[str],
-        limbs: Sequence[Limb],
+        self, params: Array, clips: Sequence[tuple[Array, float]], names: Sequence[str], limbs: Sequence[Limb]
     ) -> None:
         super().__init__(params)
         # Stored as given, so that a map rebuilt from them is the same bit for bit.

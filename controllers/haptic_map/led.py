@@ -125,9 +125,7 @@ def _carry_along(  # noqa: PLR0913 - derivatives by either number of the walker 
     spin[0, by] += pace * turn * up_x
     spin[1, by] += pace * turn * up_y
     spin[2, by] += pace * turn * (1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]))
-    q[0], q[1], q[2], q[3] = multiply(
-        np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading), q[0], q[1], q[2], q[3]
-    )  # fmt: skip
+    q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading), q[0], q[1], q[2], q[3])
 
 
 @njit

@@ -182,9 +182,7 @@ def _packed_ground(channels: list[Array], limbs: Sequence[Limb]) -> Array:
     if not limbs:
         return np.zeros(1 + len(channels))
     floor = min(lowest_of_limbs(clip[:, None], limbs, SOFTNESS).min() for clip in channels)
-    return np.concatenate([
-        [floor], *(grounds(clip[:, None], limbs) for clip in channels), packed_soles(limbs),
-    ])  # fmt: skip
+    return np.concatenate([[floor], *(grounds(clip[:, None], limbs) for clip in channels), packed_soles(limbs)])
 
 
 def _packed_pairs(

@@ -97,11 +97,9 @@ def planted_ends(
     ends : Array, shape (n, 4)
         Position (3) and λ.
     """
-    n, hold, free = (
-        len(channels),
-        smooth_mask(stands, _STANCE_EDGE_FRACTION),
-        smooth_mask(~stands, _SWING_EDGE_FRACTION),
-    )
+    n = len(channels)
+    hold = smooth_mask(stands, _STANCE_EDGE_FRACTION)
+    free = smooth_mask(~stands, _SWING_EDGE_FRACTION)
     if stands.all() or not stands.any():
         # Without swing, or without stance, the phase advances uniformly.
         free = np.ones(n)

@@ -53,9 +53,7 @@ def correction(table: Array, angle: float, a: float, b: float, d: Array, slopes:
     """
     rows, nodes, channels = int(table[_ROWS]), int(table[_NODES]), int(table[_CHANNELS])
     scale, steps = rows / (2.0 * np.pi), nodes - 1
-    row, i, j = (
-        min(int(angle * scale), rows - 1), min(int(a * steps), steps - 1), min(int(b * steps), steps - 1),
-    )  # fmt: skip
+    row, i, j = min(int(angle * scale), rows - 1), min(int(a * steps), steps - 1), min(int(b * steps), steps - 1)
     s, u, v = angle * scale - row, a * steps - i, b * steps - j
     along, along_slope = basis(s), basis_slope(s)
     in_a, in_a_slope, in_b, in_b_slope = basis(u), basis_slope(u), basis(v), basis_slope(v)

@@ -292,11 +292,7 @@ class Plausibility:
         faults = np.zeros(FAULT_SIZE)
         faults[FAULT_RAMP] = ramp
         faults[_FRESH_TIME] = faults[_COMMAND_TIME] = np.nan
-        faults[_PERIOD], faults[_MAX_RATE:_COUNT], faults[_COUNT:_SILENCE] = (
-            self.period,
-            self.rates,
-            self.steps,
-        )
+        faults[_PERIOD], faults[_MAX_RATE:_COUNT], faults[_COUNT:_SILENCE] = self.period, self.rates, self.steps
         faults[_SILENCE], faults[_RAMP_TIME] = self.silence, self.ramp
         faults[_STILL_TIME], faults[_STILL_LOAD] = self.still, self.still_load
         return faults

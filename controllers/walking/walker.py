@@ -233,9 +233,7 @@ def _integrate_motion(follow: Following, walker: Walker, dt: float) -> None:
 def _update_flight(follow: Following, walker: Walker) -> None:
     """Update u by the phase of the lap and the speed (see `controllers.walking.gait`)."""
     share = share_of_stance(follow.stances, walker.argument[0] / follow.stride)
-    walker.argument[1] = decide_flight(
-        walker.flight, share, walker.speed[0], follow.take_off, follow.landing
-    )  # fmt: skip
+    walker.argument[1] = decide_flight(walker.flight, share, walker.speed[0], follow.take_off, follow.landing)
 
 
 @njit

@@ -43,8 +43,6 @@ class Command:
         """Render."""
         from experiments.render.film import Film, render
 
-        film = Film(
-            self.show, self.camera, self.ghost, self.start, self.seconds, self.width, self.height, self.fps
-        )  # fmt: skip
+        film = Film(self.show, self.camera, self.ghost, self.start, self.seconds, self.width, self.height, self.fps)
         say(render(self.folder, self.out or self.folder / "film.mp4", film, self.gif, self.overwrite), self.json)
         return 0

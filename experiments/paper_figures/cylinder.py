@@ -8,15 +8,7 @@ from matplotlib.figure import Figure
 
 from experiments.config.maps import Cylindrical
 from experiments.paper_figures.silhouettes import Paint, Silhouettes, model_colour
-from experiments.paper_figures.sources import (
-    COMPOSITE,
-    CYLINDER,
-    MILLIMETRES,
-    curve_of,
-    poses_at,
-    pushed_lap,
-    ticks,
-)
+from experiments.paper_figures.sources import COMPOSITE, CYLINDER, MILLIMETRES, curve_of, poses_at, pushed_lap, ticks
 from experiments.paper_figures.space import path, workspace
 from experiments.results.folder import RECORDING, clips_of, config_of
 from geometry.arrays import Array

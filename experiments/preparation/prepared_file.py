@@ -78,10 +78,7 @@ def summary(outcome: PreparedFile) -> str:
     """One line for the terminal."""
     made, flights = outcome.made, outcome.flights
     if len(flights) > _MAX_NAMED + 1:
-        flights = (
-            *flights[:_MAX_NAMED],
-            f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists",
-        )
+        flights = (*flights[:_MAX_NAMED], f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists")
     faults = outcome._replace(flights=flights).faults()
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; "

@@ -41,12 +41,7 @@ def place_feet(s: FigureState, q_r: Array, v_r: Array) -> None:
     q_r, v_r : Array
         Reference pose (75) and velocity (57), in the conventions of qpos and qvel.
     """
-    shift, drift, offset, rate = (
-        work_array((N_FOOT, 3)),
-        work_array((N_FOOT, 3)),
-        work_array(N_LEG),
-        work_array(N_LEG),
-    )
+    shift, drift, offset, rate = work_array((N_FOOT, 3)), work_array((N_FOOT, 3)), work_array(N_LEG), work_array(N_LEG)
     omega = s.gains.joint_rate
     for leg in range(2):
         _contact_displacements(s, q_r, v_r, leg, shift, drift)

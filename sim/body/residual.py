@@ -89,6 +89,4 @@ class ResidualMeasure:
         """The residual of all wrenches added so far; zero if there were none."""
         (force, moment), n = self._squares, max(self._count, 1)
         largest = self._largest.tolist()
-        return Residual(
-            self._count * self._period, math.sqrt(force / n), largest[0], math.sqrt(moment / n), largest[1]
-        )  # fmt: skip
+        return Residual(self._count * self._period, math.sqrt(force / n), largest[0], math.sqrt(moment / n), largest[1])

@@ -25,9 +25,7 @@ from sim.world.plant import Plant
 
 DeviceState: TypeAlias = SimulatedPhantom | ReplayedHand | Exchange
 
-_SENSE: dict[type, Any] = {
-    SimulatedPhantom: sense_simulated, ReplayedHand: sense_replayed, Exchange: sense_exchange,
-}  # fmt: skip
+_SENSE: dict[type, Any] = {SimulatedPhantom: sense_simulated, ReplayedHand: sense_replayed, Exchange: sense_exchange}
 _ACTUATE: dict[type, Any] = {
     SimulatedPhantom: actuate_simulated, ReplayedHand: actuate_replayed, Exchange: actuate_exchange,
 }  # fmt: skip

@@ -66,9 +66,7 @@ _FAULTS = {0x0200: Fault.MOTORS_HOT, 0x0203: Fault.TOO_FAST, 0x0302: Fault.UNPLU
 class ErrorInfo(ctypes.Structure):
     """The library's struct HDErrorInfo."""
 
-    _fields_ = [
-        ("errorCode", ctypes.c_uint), ("internalErrorCode", ctypes.c_int), ("hHD", ctypes.c_uint),
-    ]  # fmt: skip
+    _fields_ = [("errorCode", ctypes.c_uint), ("internalErrorCode", ctypes.c_int), ("hHD", ctypes.c_uint)]
 
 
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {

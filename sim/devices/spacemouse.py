@@ -48,13 +48,7 @@ class SpaceMouse:
         Clock by which the velocity is integrated, and which timestamps the readings [s].
     """
 
-    def __init__(
-        self,
-        handle: HidHandle,
-        name: str,
-        transport: str,
-        clock: Callable[[], float] = time.perf_counter,
-    ):
+    def __init__(self, handle: HidHandle, name: str, transport: str, clock: Callable[[], float] = time.perf_counter):
         self._handle, self._clock = handle, clock
         handle.set_nonblocking(True)
         self.identity = DeviceIdentity(name, transport, "", "", False, False, True)

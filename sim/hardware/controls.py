@@ -162,9 +162,7 @@ class HardwareRun:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        for shared in (
-            self._orders, self.status, self._rows, self._detail, self._stop_recording, self.recorder_status
-        ):  # fmt: skip
+        for shared in (self._orders, self.status, self._rows, self._detail, self._stop_recording, self.recorder_status):
             shared.close()
 
     def start(self) -> Ready:

@@ -257,10 +257,7 @@ def _foot_track(choreography: Choreography, side: str, t: Array) -> Array:
         if j == i + 1 and np.any(knot_poses[0, :2] != knot_poses[1, :2]):
             via = knot_poses.mean(axis=0)
             via[[2, 4]] += _SWING_LIFT
-            knot_times, knot_poses = (
-                np.insert(knot_times, 1, knot_times.mean()),
-                np.insert(knot_poses, 1, via, axis=0),
-            )
+            knot_times, knot_poses = np.insert(knot_times, 1, knot_times.mean()), np.insert(knot_poses, 1, via, axis=0)
         in_segment = segment == k
         track[in_segment] += _from_rest_to_rest(knot_times, knot_poses)(t[in_segment])
     return track

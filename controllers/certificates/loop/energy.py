@@ -168,10 +168,8 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     """
     moving = river.moving()
     gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
-    pushed, executed = (
-        PushedRiver(river, gain, float(own_force(river, moving).max()), ceiling),
-        injection(river, moving),
-    )
+    pushed = PushedRiver(river, gain, float(own_force(river, moving).max()), ceiling)
+    executed = injection(river, moving)
     allowed, (distance, felt) = pushed.most(), pushed.bounds(push)
     figures = _power_figures(river, moving, executed) | {
         "speed_bound": float(_curve_speed(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,

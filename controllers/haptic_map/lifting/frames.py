@@ -19,13 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.errors import ParameterError
 from controllers.motion.channels import closing_signs, normalise, signed_like
-from controllers.motion.loops import (
-    drift_of,
-    periodic_remainder,
-    placed_at_origin,
-    plane_exponential,
-    rotate_in_plane,
-)
+from controllers.motion.loops import drift_of, periodic_remainder, placed_at_origin, plane_exponential, rotate_in_plane
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from geometry.quaternions import about_axis, product

@@ -79,11 +79,9 @@ def measure_span(
 
     The animation is None in a run without a figure, the figure None if it is not simulated physically.
     """
-    path, animation, figure = (
-        PathMeasure(recording, span[0], handled),
-        AnimationMeasure(recording, span[0]),
-        FigureMeasure(recording),
-    )
+    path = PathMeasure(recording, span[0], handled)
+    animation = AnimationMeasure(recording, span[0])
+    figure = FigureMeasure(recording)
     tank = TankSummary(math.inf, 0)
     physical, shown = "joint_error" in recording.groups["frames"], has_animation(recording)
     per_frame = round(recording.rates["ticks"] / recording.rates["frames"])

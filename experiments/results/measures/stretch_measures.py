@@ -96,11 +96,8 @@ def _press_summary(ticks: dict[str, Array], curve: Trajectory, epsilon: float, b
     t, p, phase, nearest = ticks["t"][k:], ticks["p"][k:], ticks["phase"][k:], ticks["nearest"]
     seconds = float(2.0 * t[-1] - t[0] - ticks["t"][len(ticks["t"]) - 2]) if len(ticks["t"]) > 1 else 0.0
     force = float(np.linalg.norm(ticks["user"][k:], axis=1).max())
-    lap, since, what = (
-        float((phase[-1] - curve.start) / curve.duration),
-        0,
-        _press_kind(p, seconds, ticks["distance"][k], epsilon),
-    )
+    lap, since = float((phase[-1] - curve.start) / curve.duration), 0
+    what = _press_kind(p, seconds, ticks["distance"][k], epsilon)
     if what == "pushed":
         changes = np.flatnonzero(np.diff(phase))
         since = k + int(changes[-1]) if len(changes) else 0

@@ -56,9 +56,7 @@ def place_of(part: Cylindrical | Composite | RiverClips | MapFile) -> Place:
     return Place(curve, around.radius, part.reach, part.expressive)
 
 
-def about_circle(
-    place: Place, made: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None
-) -> ClipMapParts:  # fmt: skip
+def about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None) -> ClipMapParts:
     """Map parts of a map of clips about a circle.
 
     `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights

@@ -210,10 +210,8 @@ def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:
         return ()
     speed_ratio = min(pace, _MAX_SCALED_SPEED) / _REFERENCE_SPEED
     x, y, z = (float(value) for value in curve.point(curve.start + _CROSSING_PHASE * lap - _LEAD_TIME / speed_ratio))
-    duration, force = (
-        _PUSH_DURATION / speed_ratio,
-        speed_ratio ** (1.0 if speed_ratio > 1.0 else _SLOW_FORCE_EXPONENT) * RIVER_PUSH,
-    )
+    duration = _PUSH_DURATION / speed_ratio
+    force = speed_ratio ** (1.0 if speed_ratio > 1.0 else _SLOW_FORCE_EXPONENT) * RIVER_PUSH
     starts = lap * np.arange(0.25, max(1.0, seconds / lap))
     return tuple(
         Push(float(start), duration, force, (0.0, 0.0, 1.0), (x, y, z), PUSH_START_DISTANCE) for start in starts

@@ -39,10 +39,8 @@ def effects_figure(found: Statistics, factor: str) -> Figure | None:
     if not contrasts:
         return None
     rows: Mapping[tuple[str, str], Contrast] = {(c.measure, c.level): c for c in contrasts}
-    measures, levels = (
-        list(dict.fromkeys(c.measure for c in contrasts)),
-        list(dict.fromkeys(c.level for c in contrasts)),
-    )
+    measures = list(dict.fromkeys(c.measure for c in contrasts))
+    levels = list(dict.fromkeys(c.level for c in contrasts))
     figure = Figure(figsize=(7.0, 0.42 * len(measures) + 1.2), layout="constrained")
     axis = figure.subplots()
     for k, level in enumerate(levels):

@@ -123,12 +123,10 @@ def _differentiate(model: mujoco.MjModel, d: mujoco.MjData, force: Array, partia
     """Write the derivatives of generalised forces (57,) by position, velocity and acceleration, shape (3, 57, 57)."""
     changed_force, full = np.zeros(N_TANGENT), np.empty((N_TANGENT, N_TANGENT))
     # Looked up once: these loops call them a hundred times for each of some hundred states in an iteration.
-    kinematics, com_position, com_velocity, inverse = (
-        mujoco.mj_kinematics,
-        mujoco.mj_comPos,
-        mujoco.mj_comVel,
-        mujoco.mj_rne,
-    )
+    kinematics = mujoco.mj_kinematics
+    com_position = mujoco.mj_comPos
+    com_velocity = mujoco.mj_comVel
+    inverse = mujoco.mj_rne
     mujoco.mj_crb(model, d)
     _write_mass_matrix(model, d, full)
     partials[2] = full

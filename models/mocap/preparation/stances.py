@@ -107,10 +107,8 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     for foot, side in enumerate(("left", "right")):
         spheres = slice(4 * foot, 4 * foot + 4)
         foot_rotations = rotations[:, BODIES.index(f"{side}_foot")]
-        yaw, rate = (
-            np.unwrap(quaternions.heading(foot_rotations)),
-            quaternions.rotated(foot_rotations, quaternions.velocities(foot_rotations, fps))[:, 2],
-        )
+        yaw = np.unwrap(quaternions.heading(foot_rotations))
+        rate = quaternions.rotated(foot_rotations, quaternions.velocities(foot_rotations, fps))[:, 2]
         for start, end in spans(np.any(parts[:, foot], axis=1)):
             stance = slice(start, end)
             turning = foot_turns(rate[stance], load[stance], fps)

@@ -16,9 +16,7 @@ _SIZE_LIMIT = 100_000  # bytes
 _REQUIRED_ROLES = tuple(f"{side}_{part}" for side in ("left", "right") for part in ("thigh", "shank"))
 
 
-def stated_roles(
-    path: Path, motion: SourceMotion, people: Sequence[Sequence[int]]
-) -> tuple[SourceMotion, Roles]:  # fmt: skip
+def stated_roles(path: Path, motion: SourceMotion, people: Sequence[Sequence[int]]) -> tuple[SourceMotion, Roles]:
     """The roles in a file, for the joints of a motion, and the motion of the body to which they belong.
 
     Roles are the figure's bodies, and the ends of forearms and feet: ``left_wrist`` (if the hand is another joint

@@ -33,9 +33,7 @@ def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
 
 
 @njit
-def turning_moment(
-    stiffness: float, damping: float, turns: Array, t: float, q: Array, w: Array, moment: Array
-) -> None:  # fmt: skip
+def turning_moment(stiffness: float, damping: float, turns: Array, t: float, q: Array, w: Array, moment: Array) -> None:
     r"""Set the moment of fingers that hold the stylus at the intended orientation R_d: k log(R_d Rᵀ) + b (ω_d − ω).
 
     Parameters
