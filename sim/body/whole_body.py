@@ -182,7 +182,7 @@ def _blend_free_root_motion(s: FigureState, support: float) -> None:
     """Blend the root's planned acceleration with that of its free motion, M_rr a_r = J_rᵀ f + w − c_r − M_rj a_j.
 
     The wanted acceleration is weighted by the support, the free one by the rest. The caller sets the support to zero
-    also where the residual is at its bounds: torques planned for an acceleration that does not occur fling the limbs.
+    also where the residual is at its bounds: torques planned for an acceleration that does not occur move the limbs.
     """
     if support >= 1.0:
         return
