@@ -32,7 +32,7 @@ from models.mocap.preparation.bounds import (
 )
 from models.mocap.preparation.feasible import ContactForces, contact_forces
 from models.mocap.preparation.poses import extend_periodically, resampled, smoothed
-from models.mocap.preparation.skate import MAX_REST_SPEED, moving_points, skates
+from models.mocap.preparation.skate import MAX_REST_SPEED, loaded_slide, moving_points, skates
 from models.mocap.preparation.stances import stances
 
 # Half or twice either value finds the same outliers in the nine embedded clips and 17 captures.
@@ -55,7 +55,8 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances [m].
+        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances, or that of feet
+        which slide under load where it is larger [m].
     slid : float
         The same, largest over all stances [m].
     outliers : int
@@ -96,22 +97,32 @@ class WellFormed:
     joint: str
 
     def faults(self) -> tuple[str, ...]:
-        """Measures that exceed their bounds, a line each."""
+        """Measures that exceed their bounds, a line each: forces first, then what can be seen, then limits."""
         found: list[str] = []
-        if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT:
-            found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
-        if self.depth > MAX_SOLE_DEPTH:
+        if self.residual > (bound := RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
             found.append(
-                f"a sole goes {exceeding_text(1000 * self.depth, 1000 * MAX_SOLE_DEPTH)} mm below the floor; "
-                f"{1000 * MAX_SOLE_DEPTH:.0f} at most"
+                f"contact leaves a residual of {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
+                f"{100 * bound:.0f} % at most"
             )
-        if self.tilt > MAX_SOLE_TILT:
-            found.append(f"soles are tilted by {exceeding_text(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
+        if self.flight_error > MAX_FLIGHT_ACCELERATION_ERROR:
+            found.append(
+                f"flights differ from gravity by {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} "
+                f"m/s²; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
+            )
         if self.skate > MAX_SKATE:
             found.append(
                 f"feet skate by {exceeding_text(1000 * self.skate, 1000 * MAX_SKATE)} mm in a stance; "
                 f"{1000 * MAX_SKATE:.0f} at most"
             )
+        if self.depth > MAX_SOLE_DEPTH:
+            found.append(
+                f"a sole goes {exceeding_text(1000 * self.depth, 1000 * MAX_SOLE_DEPTH)} mm below the floor; "
+                f"{1000 * MAX_SOLE_DEPTH:.0f} at most"
+            )
+        if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT:
+            found.append(f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm; −3 to 5")
+        if self.tilt > MAX_SOLE_TILT:
+            found.append(f"soles are tilted by {exceeding_text(np.rad2deg(self.tilt), 2.0)}°; 2° at most")
         if self.outliers:
             found.append(f"{self.outliers} frames are outliers in acceleration; 0 at most")
         if self.closed and self.seam > MAX_SEAM_VELOCITY_JUMP:
@@ -124,18 +135,8 @@ class WellFormed:
                 f"an end moves with {exceeding_text(self.seam, MAX_END_SPEED)} rad/s; rest at both, "
                 f"{MAX_END_SPEED} at most"
             )
-        if self.flight_error > MAX_FLIGHT_ACCELERATION_ERROR:
-            found.append(
-                f"flights differ from gravity by {exceeding_text(self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR)} "
-                f"m/s²; {MAX_FLIGHT_ACCELERATION_ERROR} at most"
-            )
         if self.excess > MAX_LIMIT_EXCESS:
             found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
-        if self.residual > (bound := RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL):
-            found.append(
-                f"contact leaves a residual of {exceeding_text(100 * self.residual, 100 * bound)} % of weight RMS; "
-                f"{100 * bound:.0f} % at most"
-            )
         if self.strain > 1.0:
             found.append(
                 f"{self.joint} needs {exceeding_text(100 * self.strain, 100.0)} % of its torque limit; 100 % at most"
@@ -182,10 +183,10 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         if clip.n_frames > 8
         else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     )
-    found = skates(clip, schedule, forces.loads)
+    found, slide = skates(clip, schedule, forces.loads), loaded_slide(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles), float(np.quantile(found, 0.95)),
-        float(found.max()), outliers(clip), closed,
+        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles),
+        max(float(np.quantile(found, 0.95)), slide), max(float(found.max()), slide), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
         float(beyond_ranges(clip.poses).max()),
         forces.residual, forces.strain, forces.joint,
