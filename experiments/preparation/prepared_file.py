@@ -75,8 +75,8 @@ class PreparedFile(NamedTuple):
         )
 
     def advice(self) -> tuple[str, ...]:
-        """What the clip lacks of the capture, and what may help if it is not feasible, a line each."""
-        if self.made.near and self.followed.fell is None:
+        """What the clip lacks of the capture, and what may help if the figure does not stand with it, a line each."""
+        if self.made.near and self.followed.stands:
             return losses(self.made)
         whole = "" if self.made.looped.kind == "open" else "--loop open if it does not repeat, "
         return (
