@@ -71,6 +71,8 @@ class WellFormed:
         RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
         Largest excess of a joint over its range [rad].
+    bent : str
+        The joint with this excess.
     residual : float
         RMS of the force that contact cannot provide, by inverse dynamics of the clip [body weights].
     strain : float
@@ -92,6 +94,7 @@ class WellFormed:
     flights: int
     flight_error: float
     excess: float
+    bent: str
     residual: float
     strain: float
     joint: str
@@ -136,7 +139,7 @@ class WellFormed:
                 f"{MAX_END_SPEED} at most"
             )
         if self.excess > MAX_LIMIT_EXCESS:
-            found.append(f"a joint is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
+            found.append(f"{self.bent} is {exceeding_text(np.rad2deg(self.excess), 1.0)}° beyond its range; 1° at most")
         if self.strain > 1.0:
             found.append(
                 f"{self.joint} needs {exceeding_text(100 * self.strain, 100.0)} % of its torque limit; 100 % at most"
@@ -183,12 +186,13 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         if clip.n_frames > 8
         else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     )
+    excess = beyond_ranges(clip.poses).max(axis=0)
     found, slide = skates(clip, schedule, forces.loads), loaded_slide(clip, schedule, forces.loads)
     return WellFormed(
         clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles),
         max(float(np.quantile(found, 0.95)), slide), max(float(found.max()), slide), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
-        float(beyond_ranges(clip.poses).max()),
+        float(excess.max()), JOINTS[int(excess.argmax())],
         forces.residual, forces.strain, forces.joint,
     )  # fmt: skip
 

@@ -106,15 +106,16 @@ def test_lines_are_in_the_order_of_importance(near):
     """First falls and the lack of a feasible motion, then what can be seen, limits and distance, and advice last."""
     made = _made(None, near)
     sound = well_formed(made.clip, ())
-    faulty = replace(sound, residual=0.2, skate=0.02, depth=0.03, highest=0.02, excess=0.1, strain=1.2)
+    bent = replace(sound, excess=0.1, bent="left_knee", strain=1.2)
+    faulty = replace(bent, residual=0.2, skate=0.02, depth=0.03, highest=0.02)
     far = made.fidelity._replace(joints=0.2)
     outcome = PreparedFile(made._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
     first, *below = str(outcome).splitlines()
     assert first.endswith("; not well-formed")
     starts = [
         "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
-        "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at", "a joint is", "",
-        "flight at 1 s", "joints are", "the capture turns by 90°", "try --loop START:END",
+        "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
+        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°", "try --loop START:END",
     ]  # fmt: skip
     assert len(below) == len(starts)
     assert all(line.startswith(f"  {start}") for line, start in zip(below, starts, strict=True))
