@@ -115,7 +115,8 @@ def test_lines_are_in_the_order_of_importance(near):
     starts = [
         "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
         "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
-        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°", "try --loop START:END",
+        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°",
+        "try --loop START:END",
     ]  # fmt: skip
     assert len(below) == len(starts)
     assert all(line.startswith(f"  {start}") for line, start in zip(below, starts, strict=True))
