@@ -189,7 +189,7 @@ def losses(made: Prepared) -> tuple[str, ...]:
     turn, repeated = (round(float(np.rad2deg(angle))) for angle in part.turns)
     if abs(turn - repeated) > _MAX_LOST_TURN:
         lines.append(f"the capture turns by {turn}°, at the cycle's rate by {repeated}°: --loop open keeps its turns")
-    if made.paced.pace == 1.0 and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
+    if made.paced.pace == 1.0 and not made.hands.seconds and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
         rate = made.captured.fps * float(np.sqrt(GRAVITY / falls))
         lines.append(
             f"its flights fall at {two_digits(falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
