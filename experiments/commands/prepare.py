@@ -50,6 +50,6 @@ class Command:
             "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
         report = outcome.made.report
-        lines = [*(report.notes() if report else ()), summary(outcome)]
+        lines = [*(report.notes() if report else ()), *summary(outcome)]
         say({"lines": lines, **output}, self.json)
         return 0

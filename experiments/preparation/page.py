@@ -4,7 +4,7 @@ from html import escape
 
 from experiments.files.html_page import html_page, image
 from experiments.preparation.filmstrip import filmstrip
-from experiments.preparation.prepared_file import Measured, PreparedFile, advice, changes, gaps
+from experiments.preparation.prepared_file import Measured, PreparedFile, changes, gaps
 from experiments.preparation.side_by_side_replay import both_html
 
 
@@ -25,12 +25,15 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
         points = "".join(f"<li>{escape(line)}</li>" for line in lines)
         return f"<h2>{title}</h2><ul>{points}</ul>" if lines else ""
 
-    verdict = "Well-formed." if made.near and not outcome.faults() else "Not well-formed."
+    verdict = "Not well-formed." if outcome.faults() else "Well-formed."
     body = (
         f'<p>{verdict} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(made))
-        + listed("What is not within bounds, or not certified", (*outcome.faults(), *outcome.doubts, *advice(made)))
+        + listed(
+            "What is not within bounds, not certified, or not in the clip",
+            (*outcome.faults(), *outcome.doubts, *outcome.advice()),
+        )
         + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
         + picture
         + listed("How the file was read", made.report.lines() if made.report else ())

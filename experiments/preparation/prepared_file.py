@@ -62,20 +62,32 @@ class PreparedFile(NamedTuple):
         return self.made.clip
 
     def __str__(self) -> str:
-        return summary(self)
+        return "\n".join(summary(self))
 
     def faults(self) -> tuple[str, ...]:
-        """Measures that exceed their bounds, a line each."""
+        """What makes the clip unusable, then what can be seen, then how far it is from the capture, a line each."""
         return (
-            *self.measures.faults(),
-            *self.made.fidelity.faults(),
-            *self.flights,
             *self.followed.faults(self.measures.flights > 0),
+            *infeasible(self.made),
+            *self.measures.faults(),
+            *self.flights,
+            *self.made.fidelity.faults(),
+        )
+
+    def advice(self) -> tuple[str, ...]:
+        """What the clip lacks of the capture, and what may help if the figure does not stand with it, a line each."""
+        if self.made.near and self.followed.stands:
+            return losses(self.made)
+        whole = "" if self.made.looped.kind == "open" else "--loop open if it does not repeat, "
+        return (
+            *losses(self.made),
+            f"try --loop START:END for a part without what is not feasible, {whole}"
+            "or a capture whose support is feet and hands alone",
         )
 
 
-def summary(outcome: PreparedFile) -> str:
-    """One line for the terminal."""
+def summary(outcome: PreparedFile) -> tuple[str, ...]:
+    """Lines for the terminal: what was done and whether the clip is well-formed; below, faults, doubts and advice."""
     made, flights = outcome.made, outcome.flights
     if len(flights) > _MAX_NAMED + 1:
         flights = (*flights[:_MAX_NAMED], f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists")
@@ -83,9 +95,8 @@ def summary(outcome: PreparedFile) -> str:
     return (
         f"{made.clip.name}: {'; '.join(changes(made))}; "
         f"contact leaves a residual of {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
-        f"{made.seconds:.0f} s of processor time; "
-        + ("well-formed" if not faults and made.near else "not well-formed: " + "; ".join(faults))
-        + "".join(f"; {line}" for line in (*outcome.doubts, *advice(made)))
+        f"{made.seconds:.0f} s of processor time; " + ("not well-formed" if faults else "well-formed"),
+        *(f"  {line}" for line in (*faults, *outcome.doubts, *outcome.advice())),
     )
 
 
@@ -118,21 +129,8 @@ def changes(made: Prepared) -> tuple[str, ...]:
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
-    seconds, since = part.left_out
-    if seconds > _MIN_LEFT_OUT:
-        what = f"{seconds:.1f} s of the capture, the first at {since:.2f} s, are unlike the cycle"
-        lines.append(f"{what}: --loop open keeps them")
-    turn, repeated = (round(float(np.rad2deg(angle))) for angle in part.turns)
-    if abs(turn - repeated) > _MAX_LOST_TURN:
-        lines.append(f"the capture turns by {turn}°, at the cycle's rate by {repeated}°: --loop open keeps its turns")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall at {pace.falls:.1f} m/s²")
-    elif pace.falls is not None and 0.0 < pace.falls < _MAX_SLOW_FALL:
-        rate = made.captured.fps * float(np.sqrt(GRAVITY / pace.falls))
-        lines.append(
-            f"its flights fall at {two_digits(pace.falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
-            "if they are jumps, give --frame-rate"
-        )
     if made.root_shift > _MIN_ROOT_SHIFT:
         lines.append(f"moved over the floor by up to {100 * made.root_shift:.0f} cm, since a loaded foot slides")
     if not made.near:
@@ -160,8 +158,8 @@ def gaps(made: Prepared) -> tuple[str, str]:
     return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
 
 
-def advice(made: Prepared) -> tuple[str, ...]:
-    """Advice if no feasible motion is near the capture: how far the nearest one found is, and what may help."""
+def infeasible(made: Prepared) -> tuple[str, ...]:
+    """How far the nearest feasible motion that was found is from the capture, if none is near."""
     change = made.feasible
     if made.near:
         return ()
@@ -174,7 +172,24 @@ def advice(made: Prepared) -> tuple[str, ...]:
         f"no feasible motion is near: the last one tried turns joints by {np.rad2deg(change.turned):.0f}° and raises "
         f"or lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "
         f"range, and leaves a residual of {residual}",
-        "try --loop START:END for a part without what is not feasible, "
-        + ("" if made.looped.kind == "open" else "--loop open if it does not repeat, ")
-        + "or a capture whose support is feet and hands alone",
     )
+
+
+def losses(made: Prepared) -> tuple[str, ...]:
+    """What of the capture the clip lacks, or has at another pace, and how to keep it, a line each."""
+    part, falls = made.looped, made.paced.falls
+    lines: list[str] = []
+    seconds, since = part.left_out
+    if seconds > _MIN_LEFT_OUT:
+        what = f"{seconds:.1f} s of the capture, the first at {since:.2f} s, are unlike the cycle"
+        lines.append(f"{what}: --loop open keeps them")
+    turn, repeated = (round(float(np.rad2deg(angle))) for angle in part.turns)
+    if abs(turn - repeated) > _MAX_LOST_TURN:
+        lines.append(f"the capture turns by {turn}°, at the cycle's rate by {repeated}°: --loop open keeps its turns")
+    if made.paced.pace == 1.0 and not made.hands.seconds and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
+        rate = made.captured.fps * float(np.sqrt(GRAVITY / falls))
+        lines.append(
+            f"its flights fall at {two_digits(falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
+            "if they are jumps, give --frame-rate"
+        )
+    return tuple(lines)

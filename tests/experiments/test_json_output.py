@@ -33,7 +33,7 @@ def test_results_are_printed_as_json(run_folder: Path, tmp_path: Path, capsys: p
 def test_results_of_slow_commands_are_printed_as_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip, seconds: followed(clip, 1.0))
     capsys.readouterr()
     assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["root_error"] < 0.1
     assert _json(["arm", "--seconds", "1.5", "--user", "relaxed", "--out", str(tmp_path / "arm")], capsys)["lines"]

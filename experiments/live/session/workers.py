@@ -139,8 +139,8 @@ def preparation(asked: Any, told: Any) -> None:
                 write_bvh(loaded.clip, target)
                 text = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
             else:
-                line = summary(prepare_file(source, target, overwrite=True))
-                text = f"{line}, {time.perf_counter() - begin:.0f} s in all"
+                said = "; ".join(line.strip() for line in summary(prepare_file(source, target, overwrite=True)))
+                text = f"{said}, {time.perf_counter() - begin:.0f} s in all"
             told.put(Uploaded(source.name, target, text))
         except (ModelError, ValueError, ArithmeticError) as error:
             told.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))

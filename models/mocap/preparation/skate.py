@@ -37,6 +37,13 @@ def skates(clip: Clip, schedule: Stances, loads: Array) -> Array:
     return stance_skates(points, schedule.standing & low & ~swinging)
 
 
+def loaded_slide(clip: Clip, schedule: Stances, loads: Array) -> float:
+    """Largest skate of a point under load while no foot rests [m], as where feet jump across a seam; see `skates`."""
+    points, _ = moving_points(clip, schedule)
+    low = points[:, :, 2] - CONTACT_RADIUS < _MAX_FLOOR_HEIGHT
+    return float(stance_skates(points, schedule.sliding & low & (loads >= _MIN_LOAD)).max())
+
+
 def moving_points(clip: Clip, schedule: Stances) -> tuple[Array, Array]:
     """Places (n, k, 3) [m] and speeds (n, k) [m/s] of the contact points of a schedule."""
     points = contact_points(clip.poses, ALL_CONTACTS[: schedule.standing.shape[1]])

@@ -32,7 +32,7 @@ from models.mocap.preparation.bounds import (
 )
 from models.mocap.preparation.feasible import ContactForces, contact_forces
 from models.mocap.preparation.poses import extend_periodically, resampled, smoothed
-from models.mocap.preparation.skate import MAX_REST_SPEED, moving_points, skates
+from models.mocap.preparation.skate import MAX_REST_SPEED, loaded_slide, moving_points, skates
 from models.mocap.preparation.stances import stances
 
 # Half or twice either value finds the same outliers in the nine embedded clips and 17 captures.
@@ -55,7 +55,8 @@ class WellFormed:
     tilt : float
         Tilt of soles whose heel and toes are at rest, 95th percentile [rad].
     skate : float
-        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances [m].
+        Foot skate (`models.mocap.preparation.skate`), hands included, 95th percentile over stances, or that of feet
+        which slide under load where it is larger [m].
     slid : float
         The same, largest over all stances [m].
     outliers : int
@@ -70,6 +71,8 @@ class WellFormed:
         RMS difference of the centre of mass' acceleration from gravity in flights [m/s²].
     excess : float
         Largest excess of a joint over its range [rad].
+    bent : str
+        The joint with this excess.
     residual : float
         RMS of the force that contact cannot provide, by inverse dynamics of the clip [body weights].
     strain : float
@@ -91,29 +94,31 @@ class WellFormed:
     flights: int
     flight_error: float
     excess: float
+    bent: str
     residual: float
     strain: float
     joint: str
 
     def faults(self) -> tuple[str, ...]:
-        """Measures that exceed their bounds, a line each."""
-        stands_at = f"soles stand at {1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm"
-        stand = f"−{-1000 * MIN_SOLE_HEIGHT:.0f} to {1000 * MAX_SOLE_HEIGHT:.0f}"
-        found = [f"{stands_at}; {stand}"] if self.lowest < MIN_SOLE_HEIGHT or self.highest > MAX_SOLE_HEIGHT else []
+        """Measures that exceed their bounds, a line each: forces first, then what can be seen, then limits."""
         most = MAX_RESIDUAL_IN_FLIGHTS if self.flights else MAX_RESIDUAL
+        off = max(MIN_SOLE_HEIGHT - self.lowest, self.highest - MAX_SOLE_HEIGHT)
+        excess = np.rad2deg(self.excess)
+        stand = f"{1000 * self.lowest:.1f} to {1000 * self.highest:.1f} mm"
         rows = (
-            (1000 * self.depth, 1000 * MAX_SOLE_DEPTH, "a sole goes {} mm below the floor; {:g} at most"),
-            (np.rad2deg(self.tilt), np.rad2deg(MAX_SOLE_TILT), "soles are tilted by {}°; {:g}° at most"),
+            (100 * self.residual, 100 * most, "contact leaves a residual of {} % of weight RMS; {:g} % at most"),
+            (self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR, "flights differ from gravity by {} m/s²; {:g} at most"),
             (1000 * self.skate, 1000 * MAX_SKATE, "feet skate by {} mm in a stance; {:g} at most"),
+            (1000 * self.depth, 1000 * MAX_SOLE_DEPTH, "a sole goes {} mm below the floor; {:g} at most"),
+            (off, 0.0, f"soles stand at {stand}; −{-1000 * MIN_SOLE_HEIGHT:.0f} to {1000 * MAX_SOLE_HEIGHT:.0f}"),
+            (np.rad2deg(self.tilt), np.rad2deg(MAX_SOLE_TILT), "soles are tilted by {}°; {:g}° at most"),
             (self.outliers, 0, f"{self.outliers} frames are outliers in acceleration; 0 at most"),
             (self.seam, MAX_SEAM_VELOCITY_JUMP, "velocities at the seam differ by {} rad/s; {:g} at most")
             if self.closed else (self.seam, MAX_END_SPEED, "an end moves with {} rad/s; rest at both, {:g} at most"),
-            (self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR, "flights differ from gravity by {} m/s²; {:g} at most"),
-            (np.rad2deg(self.excess), np.rad2deg(MAX_LIMIT_EXCESS), "a joint is {}° beyond its range; {:g}° at most"),
-            (100 * self.residual, 100 * most, "contact leaves a residual of {} % of weight RMS; {:g} % at most"),
+            (excess, np.rad2deg(MAX_LIMIT_EXCESS), f"{self.bent} is {{}}° beyond its range; {{:g}}° at most"),
             (100 * self.strain, 100, f"{self.joint} needs {{}} % of its torque limit; {{:g}} % at most"),
         )  # fmt: skip
-        found += [text.format(exceeding_text(value, bound), bound) for value, bound, text in rows if value > bound]
+        found = [text.format(exceeding_text(value, bound), bound) for value, bound, text in rows if value > bound]
         return tuple(found)
 
     def lines(self) -> tuple[str, ...]:
@@ -156,12 +161,13 @@ def well_formed(clip: Clip, flights: Sequence[tuple[float, float]]) -> WellForme
         if clip.n_frames > 8
         else ContactForces(0.0, np.zeros_like(heights), 0.0, JOINTS[0])
     )
-    found = skates(clip, schedule, forces.loads)
+    excess = beyond_ranges(clip.poses).max(axis=0)
+    found, slide = skates(clip, schedule, forces.loads), loaded_slide(clip, schedule, forces.loads)
     return WellFormed(
-        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles), float(np.quantile(found, 0.95)),
-        float(found.max()), outliers(clip), closed,
+        clip.duration, float(low), float(high), depth, _sole_tilt(clip, soles),
+        max(float(np.quantile(found, 0.95)), slide), max(float(found.max()), slide), outliers(clip), closed,
         _seam_velocity(clip, closed), len(flights), _gravity_deviation(clip, flights),
-        float(beyond_ranges(clip.poses).max()),
+        float(excess.max()), JOINTS[int(excess.argmax())],
         forces.residual, forces.strain, forces.joint,
     )  # fmt: skip
 

@@ -1,10 +1,13 @@
 """The report of `hvf prepare`: flights as certificates define them, and what was added to the file's motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from experiments.flights.ballistics import clip_ballistics, clip_flights
-from experiments.preparation.prepared_file import changes, doubts
+from experiments.preparation.prepared_file import PreparedFile, changes, doubts, losses
+from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
@@ -76,18 +79,54 @@ def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
     assert "the file's motion is 0.01 s; the rest is coming to rest at both ends, which is not in the file" in lines[1]
 
 
-@pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
-def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
+def _made(falls: float | None, near: bool) -> Prepared:
+    """A walk as prepared from a capture that turns by 90°, which its cycle does not."""
     clip = embedded("walk")
     looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, (np.pi / 2.0, 0.1))
-    change = Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0)
-    made = Prepared(
-        clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0), change,
-        fidelity(clip, clip, looped, 1.0), 0.0, near=False,
+    return Prepared(
+        clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0),
+        Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0), fidelity(clip, clip, looped, 1.0), 0.0, near,
     )  # fmt: skip
-    eventful = changes(made._replace(looped=looped._replace(left_out=(1.2, 4.5))))
+
+
+@pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
+def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
+    made = _made(falls, near=False)
+    looped = made.looped
+    eventful = losses(made._replace(looped=looped._replace(left_out=(1.2, 4.5))))
     assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful
-    lines = changes(made)
+    lines = losses(made)
     assert any("fall at 0.5 m/s², and would fall freely at" in line for line in lines) == named
     assert "the capture turns by 90°, at the cycle's rate by 6°: --loop open keeps its turns" in lines
-    assert not any("turns by" in line for line in changes(made._replace(looped=looped._replace(turns=(0.4, 0.1)))))
+    assert not any("turns by" in line for line in losses(made._replace(looped=looped._replace(turns=(0.4, 0.1)))))
+
+
+@pytest.mark.parametrize("near", [True, False])
+def test_lines_are_in_the_order_of_importance(near):
+    """First falls and the lack of a feasible motion, then what can be seen, limits and distance, and advice last."""
+    made = _made(None, near)
+    sound = well_formed(made.clip, ())
+    bent = replace(sound, excess=0.1, bent="left_knee", strain=1.2)
+    faulty = replace(bent, residual=0.2, skate=0.02, depth=0.03, highest=0.02)
+    far = made.fidelity._replace(joints=0.2)
+    outcome = PreparedFile(made._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
+    first, *below = str(outcome).splitlines()
+    assert first.endswith("; not well-formed")
+    starts = [
+        "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
+        "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
+        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°",
+        "try --loop START:END",
+    ]  # fmt: skip
+    assert len(below) == len(starts)
+    assert all(line.startswith(f"  {start}") for line, start in zip(below, starts, strict=True))
+    assert outcome.faults() == tuple(line.strip() for line in below[:-2])
+
+
+def test_a_well_formed_clip_has_one_line_and_what_it_lacks():
+    made = _made(None, near=True)
+    outcome = PreparedFile(made, well_formed(made.clip, ()), Followed(0.01, None, 20.0, 1.0), (), ())
+    first, lost = str(outcome).splitlines()
+    assert first.endswith("; well-formed")
+    assert lost.endswith(": --loop open keeps its turns")
+    assert not outcome.faults()

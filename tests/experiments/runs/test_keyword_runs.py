@@ -101,7 +101,7 @@ def test_loaded_capture_is_prepared_as_in_a_run(
 
 @pytest.mark.slow
 def test_prepare_returns_clip_and_measures(capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip: followed(clip, 1.0))
+    monkeypatch.setattr("experiments.preparation.command.followed", lambda clip, seconds: followed(clip, 1.0))
     prepared = hvf.prepare(capture, tmp_path / "ready.bvh")
     assert "well-formed" in str(prepared)
     many = prepared._replace(flights=tuple(f"flight {k}" for k in range(7)))

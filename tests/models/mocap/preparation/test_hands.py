@@ -13,6 +13,7 @@ from models.humanoid.skeleton import (
     figure_model,
     rest_pose,
 )
+from models.mocap.dynamics.contacts import HAND_REACH
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, residual
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
@@ -123,10 +124,12 @@ def test_motions_on_feet_have_no_hands_in_their_contact_schedule(name):
 
 
 def test_hand_stance_is_extended_where_nothing_else_bears_load():
-    """The left hand stands up to frame 10 and rises after 17; the right stands from 30 and slides by 20 cm up to 25."""
+    """The left hand stands up to frame 10, and rises above its reach, after 17 far above it; the right one stands from
+    30 and slides by 20 cm up to 25."""
     palms, hands = np.full((40, 2, 3), CONTACT_RADIUS), np.zeros((40, 2), dtype=bool)
     hands[:10, 0] = hands[30:, 1] = True
-    palms[17:, 0, 2] += 0.2
+    palms[10:17, 0, 2] += HAND_REACH + 0.02
+    palms[17:, 0, 2] += 0.3
     palms[:25, 1, 0] = 0.2
     extend_hand_stances(palms, hands, 10, 30, 0.15)
     np.testing.assert_array_equal(np.flatnonzero(hands[:, 0]), np.arange(17))
