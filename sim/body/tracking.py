@@ -15,7 +15,8 @@ from geometry.arrays import Array, Mask, rms
 from models.floor import add_floor
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE, figure_model, figure_spec, standing_com
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip, pose_errors
-from models.mocap.motion.foot_skate import ContactSlide
+from models.mocap.motion.foot_skate import ContactSlide, Rolling
+from models.mocap.motion.kinematics import contact_rotations
 from sim.body.clip_motion import ClipMotion, clip_motion
 from sim.body.drive import drive_unit
 from sim.body.falls import UP
@@ -79,8 +80,8 @@ class TrackedMotion(NamedTuple):
         Lowest points of the figure's contact spheres in the world, shape (n, 10, 3).
     ground : Array
         Ground reaction force on the figure [N], mean over a control period, shape (n, 3).
-    weight, com_height : float
-        Weight of the figure [N], and height of its centre of mass when it stands [m].
+    weight, radius, com_height : float
+        Weight of the figure [N], radius of its contact spheres [m], and height of its centre of mass when it stands [m].
     warnings : int
         Number of MuJoCo's warnings.
     ends : float
@@ -93,6 +94,7 @@ class TrackedMotion(NamedTuple):
     contacts: Array
     ground: Array
     weight: float
+    radius: float
     com_height: float
     warnings: int
     ends: float
@@ -122,7 +124,7 @@ class TrackingReport:
     grounded : float
         Share of the reference's time out of flight in which the ground supports the figure.
     slide : float
-        Largest slide of a contact point over the floor (`models.mocap.motion.foot_skate`) [m].
+        Largest slide of a contact point over the floor, without rolling (`models.mocap.motion.foot_skate`) [m].
     warnings : int
         Number of MuJoCo's warnings.
     """
@@ -220,7 +222,7 @@ def tracked_motion(
     _simulate(drive.address(), *arguments)
     warnings = int(sum(warning.number for warning in data.warning))
     return TrackedMotion(
-        reference, *log, figure.state.weight, standing_com(config.stature, config.mass), warnings,
+        reference, *log, figure.state.weight, figure.state.radius, standing_com(config.stature, config.mass), warnings,
         math.inf if clip.closes(CLOSURE_TOLERANCE) else clip.duration,
     )  # fmt: skip
 
@@ -251,7 +253,8 @@ def report(motion: TrackedMotion) -> TrackingReport:
         return measure.summary()
 
     on_ground, slide = up & ~in_flight, ContactSlide()
-    slide.add(motion.contacts, np.less(motion.contacts[:, :, 2], 0.0) & up[:, None])
+    rolled = Rolling(motion.radius).add(contact_rotations(motion.poses, CONTACTS))
+    slide.add(motion.contacts - rolled, np.less(motion.contacts[:, :, 2], 0.0) & up[:, None])
     return TrackingReport(
         seconds=period * len(times), flight_seconds=period * float(np.sum(in_flight)), falls=tuple(falls.tolist()),
         up_seconds=period * float(np.sum(up)), joint_error=float(np.rad2deg(rms(joints))), root_error=rms(root),

@@ -35,7 +35,7 @@ class LeadSummary:
         Largest force of the field in the horizontal plane [N].
     slide_cm, physical_slide_cm : float
         Largest slide of a point of the animation's soles while in contact (`Soles`); the same for the physical
-        figure's soles, until its first fall.
+        figure's soles, which roll, until its first fall.
     retrace_cm, retrace_deg : float or None
         On the way back, largest distance and yaw difference of the animation's root from its outward path; None if it
         never went back.
@@ -80,7 +80,7 @@ def lead_summary(
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
-    soles, pressing, shown, physical = Soles(scene), Soles(scene, 0.0), _Retrace(), _Retrace()
+    soles, pressing, shown, physical = Soles(scene), Soles(scene, physical=True), _Retrace(), _Retrace()
     farthest, force, turns = -math.inf, 0.0, np.zeros(3)
     for first in range(0, len(frames["t"]), BLOCK_FRAMES):
         rows = slice(first, first + BLOCK_FRAMES)

@@ -7,10 +7,15 @@ r"""Foot skate, measured in two ways: how far a contact point slides, and how fa
   forces of a prepared motion need. It needs the whole stance.
 
 A point that moves evenly through its contact skates half as far as it slides.
+
+A foot of the physical figure rolls on its contact spheres, by some 1.5 cm when its heel rises, and does not slide then:
+the part of the sphere that touches the floor rests, :math:`\dot c = r\,\omega \times e_z`. What a sphere has rolled
+(`Rolling`) is taken from its places before its slide is measured. A foot of an animation turns about their centres.
 """
 
 import numpy as np
 
+from geometry import quaternions
 from geometry.arrays import Array, Mask
 from models.mocap.motion.spans import spans
 
@@ -38,6 +43,21 @@ class ContactSlide:
                 self.largest = max(self.largest, float(np.linalg.norm(path - origin, axis=1).max()))
                 if end == len(points):
                     self._origins[k] = origin
+
+
+class Rolling:
+    r"""How far spheres of radius r have rolled over the floor, :math:`\int r\,\omega \times e_z\,dt`, block by block."""
+
+    def __init__(self, radius: float) -> None:
+        self._radius, self._last, self._so_far = radius, np.empty(0), np.zeros(3)
+
+    def add(self, rotations: Array) -> Array:
+        """Add rotations (n ≥ 1, k, 4) in order of time; distances rolled since the first of all (n, k, 3) [m]."""
+        before = np.concatenate((self._last if len(self._last) else rotations[:1], rotations[:-1]))
+        turned = quaternions.logarithm(quaternions.product(rotations, quaternions.conjugate(before)))
+        rolled = self._so_far + self._radius * np.cumsum(np.cross(turned, (0.0, 0.0, 1.0)), axis=0)
+        self._last, self._so_far = rotations[-1:], rolled[-1]
+        return rolled
 
 
 def stance_skates(points: Array, standing: Mask) -> Array:

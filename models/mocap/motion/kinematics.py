@@ -48,3 +48,9 @@ def contact_points(poses: Array, names: tuple[str, ...], figure: mujoco.MjModel 
         mujoco.mj_kinematics(figure, data)
         points[k] = data.geom_xpos[spheres]
     return points
+
+
+def contact_rotations(poses: Array, names: tuple[str, ...]) -> Array:
+    """Rotations in the world of the segments that bear named contact spheres, shape (n, k, 4)."""
+    figure = figure_model()
+    return global_rotations(poses)[:, [int(figure.geom(name).bodyid[0]) - 1 for name in names]]

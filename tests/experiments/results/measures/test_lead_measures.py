@@ -103,11 +103,11 @@ def test_sole_sliding_is_measured_only_in_contact() -> None:
     moved[3, 2] += 0.1
     measure.add(moved)
     assert measure.slide == pytest.approx(0.02, abs=1e-9)
-    pressing = Soles(SceneConfig(), 0.0)
+    pressing = Soles(SceneConfig(), physical=True)
     moved[:, 2] -= 1e-4
     pressing.add(moved)
     assert pressing.slide == pytest.approx(0.02, abs=1e-9)
-    hovering = Soles(SceneConfig(), 0.0)
+    hovering = Soles(SceneConfig(), physical=True)
     moved[:, 2] += 2e-4
     hovering.add(moved)
     assert hovering.slide == 0.0
