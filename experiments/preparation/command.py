@@ -6,7 +6,7 @@ from controllers.checks import check_kind
 from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
-from experiments.preparation.tracking_trial import SECONDS, followed
+from experiments.preparation.tracking_trial import TRIAL_SECONDS, followed
 from models.mocap.library import check_target, writing
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
@@ -66,4 +66,4 @@ def prepare_file(
 
 
 def _measure(clip: Clip) -> Measured:
-    return Measured(well_formed(clip, clip_flights(clip)), followed(clip, max(SECONDS, clip.duration)))
+    return Measured(well_formed(clip, clip_flights(clip)), followed(clip, max(TRIAL_SECONDS, clip.duration)))
