@@ -269,7 +269,7 @@ class Led(KernelMap):
         capture: Capture | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._arguments = (clip, tuple(limbs), phase, standing, capture)
+        self._arguments = (clip, tuple(limbs), phase, standing, capture, sway)
         poses, fps = clip
         checked = checked_clip(poses, fps, "the clip that is led")
         loop, (net, turns) = forward_loop(checked, fps), turn_of(checked)
@@ -316,7 +316,12 @@ class Led(KernelMap):
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
-        return Led(*self._arguments, sway)
+        return Led(*self._arguments[:-1], sway)
+
+    def begun_at(self, phase: float) -> "Led":
+        """The same map with another phase of the lap at s = 0."""
+        clip, limbs, _, *others = self._arguments
+        return Led(clip, limbs, phase, *others)
 
     @property
     def nq(self) -> int:

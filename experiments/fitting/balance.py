@@ -23,6 +23,7 @@ from geometry.arrays import Array
 from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
+from sim.body.falls import TOUCH_HEIGHT
 from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
@@ -123,6 +124,21 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
             break
         result = swaying
     return result
+
+
+def imbalance_at_rest(led: Led, phases: Array, figure: mujoco.MjModel) -> Array:
+    """Distances (n,) [m] of the centre of mass from the support of a led figure that stands still at phases of its lap.
+
+    Only points that the physical figure takes as touching support it: it does not sink onto those above.
+    """
+    walker_states = np.zeros((len(phases) + 2, 7))
+    walker_states[1:-1, 0] = led.stride * (phases - led.phase)
+    walker_states[:, 1] = walker_states[:, 3] = 1.0
+    at_rest = _measured_laps(map_poses(led, walker_states)[None], np.inf, figure)
+    touching = at_rest.contacts[..., 2] < TOUCH_HEIGHT
+    nearest = nearest_supported(at_rest.zmp, at_rest.contacts[..., :2], touching, 1.0)
+    distance = np.linalg.norm(nearest - at_rest.zmp, axis=-1)
+    return np.where(touching.any(axis=-1), distance, np.inf)[0]
 
 
 def _lap_dynamics(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -> Laps:

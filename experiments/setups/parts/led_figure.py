@@ -1,6 +1,7 @@
 """Map parts of a led figure: the clip that is led, its map and gait, and remarks about both."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import mujoco
 import numpy as np
@@ -13,7 +14,7 @@ from controllers.motion.captures import Capture
 from controllers.walking.gait import Gait
 from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
-from experiments.fitting.balance import balanced_on_ground
+from experiments.fitting.balance import balanced_on_ground, imbalance_at_rest
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION, load_clips
 from experiments.setups.parts.leading_hand import s_curve
@@ -29,6 +30,9 @@ from sim.world.world import FigureKind
 _PHASE_COUNT = 256  # samples of the stance over a lap: one in 4 ms for a lap of a second
 # Difference of the end poses above which a clip is not a cycle: CMU 02_01's lap has 5°, its whole clip 35°.
 _MAX_CYCLE_GAP = np.deg2rad(15.0)
+# [m] distance of the centre of mass from its support up to which a figure stands still. A jog that begins 33 cm beyond
+# it needs a residual of 28 % of weight for that, within it 0.1 %.
+_MAX_IMBALANCE = 2e-3
 _MIN_SWING_TIME = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 
 
@@ -37,6 +41,12 @@ class LedParts(MapParts[Led]):
     """Map parts of a led figure, with its gait."""
 
     gait: Gait
+
+    def refine(self, physical: bool) -> Self:
+        """As `MapParts.refine`; the gait begins at the phase of the lap at which the refined map does."""
+        parts, support = super().refine(physical), self.gait.support
+        later = round(len(support) * (parts.haptic_map.phase - self.haptic_map.phase))
+        return replace(parts, gait=replace(self.gait, support=np.roll(support, -later)))
 
 
 def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> LedParts:
@@ -52,7 +62,7 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
     made, gait = led_map(clips[0], figure)
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
-        refined=lambda: (balanced_on_ground(made, gait, figure), ()),
+        refined=lambda: (_begun_in_balance(balanced_on_ground(made, gait, figure), figure), ()),
         remarks=lap_remark(clips[0], config.figure.kind) + gait_remark(clips[0].name, made, config.figure.kind),
     )  # fmt: skip
 
@@ -101,6 +111,19 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
         steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
         return steps if steps[0].has_grounded_form else made
     return made
+
+
+def _begun_in_balance(led: Led, figure: mujoco.MjModel) -> Led:
+    """The same map, beginning where the figure can stand still, if it cannot where it does; needs compiled code.
+
+    That is the middle of the nearest part of the lap in which the centre of mass is as near to its support as anywhere.
+    """
+    imbalance = imbalance_at_rest(led, led.phase + np.arange(_PHASE_COUNT) / _PHASE_COUNT, figure)
+    if imbalance[0] < _MAX_IMBALANCE:
+        return led
+    balanced = spans(imbalance < imbalance.min() + _MAX_IMBALANCE)
+    later = min((sum(span) // 2 for span in balanced), key=lambda step: min(step, _PHASE_COUNT - step))
+    return led.begun_at((led.phase + later / _PHASE_COUNT) % 1.0)
 
 
 def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:

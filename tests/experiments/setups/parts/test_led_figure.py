@@ -1,10 +1,17 @@
-"""Stances of a capture: least durations of swings and flights, and feet that sink or lift briefly."""
+"""Stances of a capture: least durations of swings and flights, feet that sink or lift briefly; where a run begins."""
 
+import mujoco
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
-from experiments.setups.parts.led_figure import stances
+from controllers.haptic_map.led import Led
+from experiments.config.options import run_config
+from experiments.setups.parts.led_figure import led_parts, stances
+from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.dynamics.contacts import Contacts
+from models.mocap.library import embedded
+from sim.reference.reference import map_poses
 
 FPS, FRAMES = 100.0, 101
 FEET = {"left": np.arange(4), "right": np.arange(4, 8)}
@@ -55,3 +62,27 @@ def test_sinking_heel_causes_no_flight() -> None:
     stands = stances(marks(*feet), FPS)
     assert stands.any(axis=1).all()
     np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(52))
+
+
+def distance_from_support(led: Led) -> float:
+    """Distance of the centre of mass from the hull of the points on the floor where the map begins [m]."""
+    figure = figure_model()
+    data = mujoco.MjData(figure)
+    data.qpos = map_poses(led, np.array([[0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]]))[0]
+    mujoco.mj_kinematics(figure, data)
+    mujoco.mj_comPos(figure, data)
+    points = np.array([data.geom(name).xpos for name in FOOT_CONTACTS])
+    points = points[points[:, 2] - CONTACT_RADIUS < 2e-3, :2]
+    # Nearest convex combination: weights that are non-negative, and with a heavy row also sum to one.
+    rows = np.vstack([points.T, 1e4 * np.ones(len(points))])
+    return float(nnls(rows, np.append(data.subtree_com[1, :2], 1e4))[1])
+
+
+def test_refined_run_begins_where_the_figure_can_stand_still() -> None:
+    parts = led_parts(run_config(mode="lead", clips=("run",)), (embedded("run"),), figure_model())
+    refined = parts.refine(False)
+    assert distance_from_support(parts.haptic_map) > 0.02
+    assert distance_from_support(refined.haptic_map) < 2.5e-3
+    n = len(parts.gait.support)
+    before, after = (np.roll(each.gait.support, round(n * each.haptic_map.phase)) for each in (parts, refined))
+    np.testing.assert_array_equal(before, after)
