@@ -1,18 +1,20 @@
 """The folder and summary of a hardware run: one run at a time, and unknown values are marked as unknown."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from controllers.safety.arming import State
 from controllers.safety.faults import Fault
 from experiments.config.part import to_dict
 from experiments.config.run_config import RunConfig
 from experiments.hardware.outcome import holds_ticks, outcome_of
-from experiments.hardware.run import run_folder
+from experiments.hardware.run import _write_results, run_folder
 from experiments.results.folder import check_folder
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -119,6 +121,15 @@ def test_servo_that_stopped_before_the_end_is_a_failure(tmp_path: Path, alive: b
     outcome = outcome_of(tmp_path / "run.h5", ready(), ended, last_status(alive))
     assert outcome.sound == alive
     assert ("The servo stopped before the end of the run." in outcome.lines()) == (not alive)
+
+
+def test_remarks_are_in_the_summary(tmp_path: Path) -> None:
+    record(tmp_path, 3)
+    outcome = outcome_of(tmp_path / "missing.h5", ready(), None, last_status(alive=True))  # draws no page
+    _write_results(outcome, ("legs are the first clip's",), tmp_path, Console(quiet=True))
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["remarks"] == ["legs are the first clip's"]
+    assert summary["lines"] == outcome.lines()
 
 
 def ready(watchdog: bool = True) -> Ready:
