@@ -12,6 +12,7 @@ The public interface: it re-exports the parts of a simulation and what can be do
     print(run)
 """
 
+from controllers.certificates.loop.hand import HandRange
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError, ParameterError
 from controllers.fields.algebra.law import Law
@@ -60,6 +61,7 @@ __all__ = [
     "Figure",
     "Follow",
     "Grab",
+    "HandRange",
     "HandState",
     "HapticMap",
     "HigherOrder",

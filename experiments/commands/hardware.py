@@ -79,7 +79,7 @@ class Doctor:
             f"{lateness.missed} deadlines missed"
         )
         if identity is not None and link is not None:
-            watchdog = "" if identity.watchdog or not identity.forces else "; no watchdog"
+            watchdog = "; no motors" if not identity.forces else "" if identity.watchdog else "; no watchdog"
             calibrated = "" if identity.calibrated else "; not calibrated"
             print(f"link     {identity.name} {identity.serial} ({identity.transport}){watchdog}{calibrated}")
             for line in link.lines():

@@ -33,7 +33,8 @@ class Cylindrical:
     Parameters
     ----------
     clips : tuple of str
-        Inner low, outer low, inner high, outer high: names of embedded clips, or motion files; fewer are repeated.
+        Inner low, outer low, inner high, outer high: names of embedded clips, or motion files; fewer are repeated. A
+        composite takes up to three: legs, upper body inside, outside; rivers up to one each, LEADING one.
     around : Circle
         The curve.
     reach : float

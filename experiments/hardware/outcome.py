@@ -27,8 +27,12 @@ class Outcome:
         Fault that was latched at the end; empty if there was none.
     let_go : tuple of str
         All faults at which the device released its force, with their times; all but the last may have been cleared.
+    stopped : bool
+        Whether the servo stopped ticking before the end, without an order.
     silent : bool
         Whether the servo's process ended without a final report.
+    watchdog : bool
+        Whether the device has a watchdog.
     broken : str
         Program error in the servo's process.
     ticks, missed : int
@@ -53,7 +57,9 @@ class Outcome:
     transport: str
     fault: str
     let_go: tuple[str, ...]
+    stopped: bool
     silent: bool
+    watchdog: bool
     broken: str
     ticks: int
     missed: int
@@ -74,7 +80,7 @@ class Outcome:
     @property
     def sound(self) -> bool:
         """Whether the run ended without a fault or failure."""
-        return not (self.fault or self.silent or self.broken)
+        return not (self.fault or self.stopped or self.silent or self.broken)
 
     def to_json(self) -> dict[str, object]:
         """All attributes by name, as plain data."""
@@ -93,7 +99,11 @@ class Outcome:
         errors = [f"The motors were switched off: {self.fault}."] if self.fault else []
         if len(self.let_go) > bool(self.fault):
             errors += [f"The motors were switched off {len(self.let_go)} times: {'; '.join(self.let_go[:3])}."]
-        errors += ["The servo's process ended early; the watchdog switched the motors off."] if self.silent else []
+        if self.silent:
+            after = "the watchdog switched the motors off" if self.watchdog else "its motors have no watchdog"
+            errors.append(f"The servo's process ended early; {after}.")
+        elif self.stopped:
+            errors.append("The servo stopped before the end of the run.")
         errors += [f"The servo failed: {self.broken.strip().splitlines()[-1]}"] if self.broken else []
         name = f"{self.device} ({self.transport})"
         return [
@@ -121,8 +131,9 @@ def outcome_of(recording: Path, ready: Ready, ended: Ended | None, last: RunStat
     found = _summarize_recording(recording)
     return Outcome(
         device=ready.identity.name, transport=ready.identity.transport,
-        fault="" if last.fault is Fault.NONE else last.fault_text, silent=ended is None,
-        broken=ended.broken if ended else "", ticks=ended.ticks if ended else int(last.row["tick"]),
+        fault="" if last.fault is Fault.NONE else last.fault_text, stopped=not last.alive,
+        silent=ended is None, watchdog=ready.identity.watchdog, broken=ended.broken if ended else "",
+        ticks=ended.ticks if ended else int(last.row["tick"]),
         missed=ended.missed if ended else int(last.row["missed"]), compute=ended.compute[:3] if ended else None,
         lateness=ended.lateness[:3] if ended else None, memory_growth=ended.memory_growth if ended else None,
         descriptors=ended.descriptors if ended else None, **found,

@@ -115,7 +115,8 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         last = attend(run, config.seconds, options, console)
         ended = run.stop()
         outcome = outcome_of(options.out / RECORDING, ready, ended, last)
-        _write_results(outcome, options.out, options.json, console)
+        summary = _write_results(outcome, session.remarks, options.out, console)
+    say(summary, options.json)  # once all is written, for nobody may read it to the end
     return 0 if outcome.sound else 1
 
 
@@ -219,18 +220,20 @@ def _serve_page(config: RunConfig, run: HardwareRun) -> Generator[None, None, No
         page.join()
 
 
-def _write_results(outcome: Outcome, out: Path, as_json: bool, console: Console) -> None:
-    say(outcome.to_json(), as_json, outcome.lines())
+def _write_results(outcome: Outcome, remarks: tuple[str, ...], out: Path, console: Console) -> dict[str, object]:
+    """Write summary and page beside the recording; returns the summary."""
+    summary = outcome.to_json() | {"remarks": remarks, "lines": outcome.lines()}
     if not holds_ticks(out / RECORDING):
         console.print(f"Nothing was recorded, so nothing is left in {out}.", highlight=False)
-        return
-    (out / SUMMARY).write_text(json_text(outcome.to_json() | {"lines": outcome.lines()}) + "\n", encoding="utf-8")
+        return summary
+    (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
         # Imported late, as it loads matplotlib.
         from experiments.results.pages.hardware_report import write_hardware_report
 
         with Recording(out / RECORDING) as recording:
-            write_hardware_report(out, recording, outcome.lines())
+            write_hardware_report(out, recording, [*remarks, *outcome.lines()])
         written.insert(0, REPORT)
     console.print(f"Written to {out}: {', '.join(written)}.", highlight=False)
+    return summary

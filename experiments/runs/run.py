@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -196,7 +196,7 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
             recording, lambda: default_poses(session), parts.handled, field.memory, field.walkers.state,
             partial(save_curve, path=out / CURVE_FILE),
         )  # fmt: skip
-        return parts.summarise(summary, of)
+        return replace(parts.summarise(summary, of), remarks=session.remarks)
 
 
 def write_animations(out: Path, session: Session) -> None:

@@ -197,14 +197,15 @@ class Study:
         config = self.config
         kinds = {trial.config.figure.kind for trial in plan_trials(replace(config, repetitions=1))}
         available = tuple(name for name in MEASURES if any(name in measures_of(kind) for kind in kinds))
-        optional = {StudyConfig.ease, StudyConfig.cost} - set(config.measures)  # a figure may lack default measures
-        for word, name in (("ease", config.ease), ("cost", config.cost)):
+        roles = (("ease", config.ease), ("cost", config.cost))
+        chosen = {name for role, name in roles if name != getattr(StudyConfig, role)}  # a figure may lack the defaults
+        for role, name in roles:
             if name in CONDITION_MEASURES:
-                raise StudyError(f"study {config.name!r}: {word} = {name!r} is of a condition; expected one of a trial")
+                raise StudyError(f"study {config.name!r}: {role} = {name!r} is of a condition; expected one of a trial")
         for name in (*config.measures, config.ease, config.cost):
             if name not in MEASURES:
                 raise StudyError(f"study {config.name!r}: no measure {name!r}; there are {', '.join(MEASURES)}")
-            if name not in available and name not in optional:
+            if name not in available and name in {*config.measures, *chosen}:
                 needed = MEASURES[name].figure
                 raise StudyError(
                     f"study {config.name!r}: {name!r} needs a figure that is {needed}; expected figure = {needed!r}"

@@ -18,6 +18,7 @@ from typing import ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
+from controllers.checks import check_kind
 from controllers.safety.faults import Fault
 from geometry.arrays import Array
 from models.phantom.kinematics import R_HP
@@ -99,10 +100,13 @@ class TipDriver:
     Raises
     ------
     SimError
-        If the device's largest force is not a positive number.
+        If the device's largest force is not positive and finite.
+    ParameterError
+        If it is not a number.
     """
 
     def __init__(self, device: TipDevice, transport: str, clock: Callable[[], float] = time.perf_counter):
+        check_kind(f"{transport}: largest_force", device.largest_force, float)
         if not 0.0 < device.largest_force < math.inf:
             raise SimError(f"{transport}: largest_force is {device.largest_force}; expected a finite force above 0 N")
         self._device, self._clock = device, clock
@@ -189,6 +193,8 @@ def _error_words(error: BaseException) -> str:
 
 
 def _checked(pose: TipPose) -> TipPose:
+    check_kind("the result of read", pose, TipPose)
+    check_kind("pressed", pose.pressed, bool | int)  # bool("no") would be a pressed dead-man switch
     position, orientation = np.asarray(pose.position, np.float64), np.asarray(pose.orientation, np.float64)
     if position.shape != (3,) or orientation.shape != (3, 3):
         raise ValueError(f"read returned shapes {position.shape} and {orientation.shape}; expected (3,) and (3, 3)")

@@ -48,7 +48,7 @@ from sim.hardware.servo_process import (
 from sim.hardware.shared import Ring, SharedNumbers
 
 SERVO_TIMEOUT = 0.2
-"""Time without a tick after which the servo counts as dead [s]."""
+"""Time without a tick, beyond its largest permitted lateness, after which the servo counts as dead [s]."""
 _START_TIMEOUT, _END_TIMEOUT = 600.0, 10.0  # [s] timeouts for a process to start, which may compile, and to end
 
 
@@ -147,6 +147,7 @@ class HardwareRun:
         self._stop_recording, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
         self._reports, report_sender = context.Pipe(duplex=False)
         self._order, self._row, self._last_tick = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
+        self._timeout = SERVO_TIMEOUT + clock.late
         self._detail = SharedNumbers(DETAIL_SIZE)
         channels = Channels(self._orders, self.status, self._rows, self._detail, report_sender)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
@@ -212,7 +213,7 @@ class HardwareRun:
         tick = float(row["tick"])
         if tick != self._last_tick[0]:
             self._last_tick = tick, now
-        alive = self.servo.is_alive() and now - self._last_tick[1] < SERVO_TIMEOUT
+        alive = self.servo.is_alive() and now - self._last_tick[1] < self._timeout
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
         codes = np.zeros(DETAIL_SIZE)
         self._detail.read(codes)

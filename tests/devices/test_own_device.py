@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controllers.errors import ParameterError
 from controllers.safety.faults import Fault
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import forward_kinematics, joint_torques, vector_to_device_frame
@@ -82,6 +83,8 @@ def test_torque_that_is_not_finite_releases_the_device() -> None:
         (OSError("gone"), Fault.UNPLUGGED), (ValueError("a bad cable"), Fault.DEVICE_REPORTED),
         (TipPose(np.zeros(2)), Fault.DEVICE_REPORTED),
         (TipPose(np.zeros(3), pressed=np.zeros(2)), Fault.DEVICE_REPORTED), ("here", Fault.DEVICE_REPORTED),
+        (TipPose(np.zeros(3), pressed="no"), Fault.DEVICE_REPORTED),
+        (TipPose(np.zeros(3), pressed=np.nan), Fault.DEVICE_REPORTED),
         (TipPose(np.array([0.0, np.nan, 0.0])), Fault.READING_NOT_FINITE),
         (TipPose(np.zeros(3), -np.eye(3)), Fault.READING_NOT_FINITE),
         (TipPose(np.array([0.9, 0.0, 0.0])), Fault.LEFT_WORKSPACE),
@@ -136,6 +139,26 @@ def test_largest_force_that_limits_nothing_is_refused(largest) -> None:
     device.largest_force = largest
     with pytest.raises(SimError, match="expected a finite force above 0 N"):
         TipDriver(device, "here")
+
+
+def test_largest_force_in_letters_is_refused() -> None:
+    device = Scripted()
+    device.largest_force = "3"
+    with pytest.raises(ParameterError, match="largest_force is '3'; expected a number"):
+        TipDriver(device, "here")
+
+
+@pytest.mark.parametrize("pressed", [True, np.True_, 1, np.uint8(1)])
+def test_switch_may_be_a_bit(pressed) -> None:
+    driver, reading = TipDriver(Scripted(TipPose(POSITION, pressed=pressed)), "here"), np.zeros(9)
+    assert driver.read(reading, 0.0)
+    assert reading[2] == 1.0
+
+
+def test_what_is_no_pose_is_named() -> None:
+    with pytest.raises(DriverFault) as refused:
+        TipDriver(Scripted((POSITION, True)), "here").read(np.zeros(9), 0.0)
+    assert "expected TipPose" in refused.value.detail
 
 
 def test_file_may_define_dataclasses_and_import_its_neighbours(tmp_path) -> None:

@@ -121,6 +121,18 @@ def test_run_continues_from_an_earlier_state(desk: LoggingDesk) -> None:
     desk.until(lambda: time_of(desk) < 0.5, "it begins again")
 
 
+def test_reset_while_paused_shows_the_stylus_on_its_curve(desk: LoggingDesk) -> None:
+    desk.pause(True)
+    desk.until(lambda: desk.paused, "it is paused")
+    desk.reset()
+    desk.until(lambda: 0.0 < time_of(desk) < 0.1, "it is at the beginning")
+    assert np.linalg.norm(desk.now["p"][:2]) == pytest.approx(0.0477, abs=2e-3)
+    stands = time_of(desk)
+    desk.step()
+    desk.until(lambda: time_of(desk) > stands, "a step passes")
+    desk.pause(False)
+
+
 def test_uploads_are_prepared_or_refused_in_one_line(desk: LoggingDesk, tmp_path: Path) -> None:
     with pytest.raises(SimError, match="expected at most 30 MB"):
         desk.upload("large.bvh", bytes(MAX_UPLOAD_BYTES + 1))

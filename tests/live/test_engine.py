@@ -221,7 +221,9 @@ def test_drag_without_bend_or_lead_is_reported_as_one_push(tmp_path, mode, press
             engine.drag = None
         take.add(engine.advance(), engine)
     lines = take.end(engine)
-    reported = json.loads((tmp_path / "take" / SUMMARY).read_text())["path"]["pushes"]
+    summary = json.loads((tmp_path / "take" / SUMMARY).read_text())
+    assert summary["remarks"] == list(engine.session.remarks)
+    reported = summary["path"]["pushes"]
     assert len(reported) == pushes
     for push in reported:
         assert push["start"] == pytest.approx(0.32, abs=1e-9)

@@ -96,7 +96,8 @@ class _EngineLoop:
             held = self._held.rows
             engine = self._engine
             paused, steps = held["paused"][0] > 0.0, held["steps"][0]
-            if engine is None or (paused and steps <= self._steps_done):
+            # Nothing is measured, or shown in its place, before the first block: it runs even while time is paused.
+            if engine is None or (paused and steps <= self._steps_done and engine.tick > 0):
                 self._steps_done = min(self._steps_done, steps)
                 time.sleep(IDLE_POLL_INTERVAL)
                 self._send_picture()

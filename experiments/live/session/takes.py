@@ -106,7 +106,7 @@ class Take:
         if isinstance(tubes, StretchyTubes):
             lines = [stretch_summary(tubes, engine.memory).line(), *lines]
             save_curve(tubes.edited(engine.memory), self.folder / CURVE_FILE)
-        results = asdict(summary) | {"lines": lines}
+        results = asdict(replace(summary, remarks=session.remarks)) | {"lines": lines}
         self._recorder.close(results)
         (self.folder / SUMMARY).write_text(json_text(results) + "\n", encoding="utf-8")
         (self.folder / CONFIG).write_text(to_json(engine.config), encoding="utf-8")

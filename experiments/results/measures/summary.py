@@ -21,7 +21,7 @@ from experiments.results.measures.summary_parts import (
 
 @dataclass(frozen=True)
 class RunSummary:
-    """The whole summary of a run, as in summary.json; `lines` gives it in words.
+    """The whole summary of a run, as in summary.json; `lines` gives what was measured in words.
 
     Attributes
     ----------
@@ -45,6 +45,8 @@ class RunSummary:
         Measured stability of the loop.
     arm : ArmSummary or None
         How a robot arm followed the stylus, if one did.
+    remarks : tuple of str
+        What was said before the run: what its clips and its map are not suited for, and what was chosen instead.
     """
 
     path: PathSummary
@@ -62,6 +64,7 @@ class RunSummary:
     trace: TraceSummary | ReplaySummary | None = None
     oscillation: OscillationSummary | None = None
     arm: ArmSummary | None = None
+    remarks: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """Summary in words, one sentence per line."""

@@ -2,10 +2,10 @@
 
 import html
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import mujoco
 from matplotlib.figure import Figure
@@ -54,17 +54,20 @@ def write_report_of(folder: Path) -> None:
 
 
 def lines_of(recording: Recording, folder: Path) -> list[str]:
-    """Summary of a run in words: from its recording, or else from summary.json, with a remark if it was interrupted."""
+    """Remarks and summary of a run in words: from its recording or summary.json; whether it was interrupted first."""
     if recording.summary is not None and "lines" in recording.summary:
-        return [str(line) for line in cast(list[object], recording.summary["lines"])]
+        return _words_of(recording.summary)
     # The recorder of a hardware run gets rows only; the summary is in the folder.
     whole = recording.summary is not None
     stopped = [] if whole else [f"The run was stopped: {recording.channel('ticks', 't')[-1]:.1f} s of it are recorded."]
     try:
-        found = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["lines"]
+        return [*stopped, *_words_of(json.loads((folder / SUMMARY).read_text(encoding="utf-8")))]
     except (OSError, ValueError, KeyError, TypeError):
         return stopped
-    return [*stopped, *map(str, found)]
+
+
+def _words_of(summary: Mapping[str, Any]) -> list[str]:
+    return [str(line) for line in (*summary.get("remarks", ()), *summary["lines"])]
 
 
 _STYLE = """

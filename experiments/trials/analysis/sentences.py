@@ -26,7 +26,9 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
     counts = " × ".join(str(len(levels)) for levels in study.factors.values())
     people = "One simulated person" if study.users.number == 1 else f"{study.users.number} simulated people"
     times = {1: "once", 2: "twice"}.get(study.repetitions, f"{study.repetitions} times")
-    outcome = "all of which came to their end" if not failed else f"of which {failed} failed"
+    reasons = list(frame.loc[frame["state"].eq("failed"), "reason"].value_counts().index)
+    others = f", and for {len(reasons) - 1} other reason{'s' * (len(reasons) > 2)}" if len(reasons) > 1 else ""
+    outcome = f"of which {failed} failed ({reasons[0]}{others})" if failed else "all of which came to their end"
     first = (
         f"{people} met {counts} conditions ({', '.join(study.factors)}), "
         f"{times} each: {len(frame)} trials of {study.seconds:g} s, {outcome}."

@@ -9,10 +9,10 @@ from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self
+from typing import Self, get_args
 
 from experiments.trials.design.study_config import StudyError
-from experiments.trials.trial.run_trial import Row
+from experiments.trials.trial.run_trial import Row, State
 
 SCHEMA = 1
 _APPLICATION_ID = 0x48564654  # "HVFT": application id, by which SQLite and `file` identify the file
@@ -103,11 +103,25 @@ class Database:
             self._db.execute("INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", values)
 
     def rows(self) -> Iterator[Row]:
-        """All rows, in the order of their keys."""
+        """All rows, in the order of their keys.
+
+        Raises
+        ------
+        StudyError
+            If a row was changed so that it cannot be read.
+        """
         columns = "key, state, reason, measures, seconds, worker, processor"
         with self._translated_errors():
             for key, state, reason, measures, *rest in self._db.execute(f"SELECT {columns} FROM trials ORDER BY key"):
-                read = {name: math.nan if value is None else value for name, value in json.loads(measures).items()}
+                try:
+                    read = {n: math.nan if value is None else float(value) for n, value in json.loads(measures).items()}
+                    if state not in get_args(State):
+                        raise ValueError(f"state {state!r}")
+                except (AttributeError, TypeError, ValueError) as error:
+                    raise StudyError(
+                        f"{self._path}: row {key!r} of the table trials is damaged ({error}); "
+                        "delete it, and the trial is run again"
+                    ) from None
                 yield Row(key, state, reason, read, *rest)
 
     def keys(self) -> set[str]:

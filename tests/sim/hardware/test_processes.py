@@ -14,7 +14,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -262,6 +265,15 @@ def test_stopped_servo_misses_deadlines_and_does_not_catch_up(tmp_path: Path, st
             assert not after["torque"].any()
         ended = run.stop()
     assert_complete(path, ended)
+
+
+def test_servo_counts_as_stopped_only_beyond_its_permitted_lateness(monkeypatch: pytest.MonkeyPatch) -> None:
+    with HardwareRun(servo_with_own_device, PERIOD, ServoClock(late=0.5)) as run:
+        run.servo, now = cast(BaseProcess, SimpleNamespace(is_alive=lambda: True, pid=None)), time.monotonic()
+        run.poll()
+        for later, alive in ((0.6, True), (0.8, False)):
+            monkeypatch.setattr(time, "monotonic", lambda later=later: now + later)
+            assert run.poll().alive == alive
 
 
 @pytest.mark.slow

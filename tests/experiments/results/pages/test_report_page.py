@@ -1,10 +1,13 @@
 """The report of a run is one self-contained file."""
 
+import json
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
+import hvf
+from experiments.cli import main
 from experiments.results.pages import report
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
@@ -91,3 +94,12 @@ def test_seed_and_versions_are_shown(write):
     text = " ".join(write().texts)
     assert "seed 42" in text
     assert f"numpy {np.__version__}" in text
+
+
+def test_remarks_before_a_run_are_in_its_summary_and_on_its_page(tmp_path, capsys) -> None:
+    hvf.run(user="turn", figure="none", seconds=0.1, record=tmp_path / "turned")
+    (remark,) = json.loads((tmp_path / "turned" / "summary.json").read_text())["remarks"]
+    assert "ignores its orientation" in remark
+    assert remark in Page((tmp_path / "turned" / "report.html").read_text()).texts
+    assert main(["report", str(tmp_path / "turned")]) == 0
+    assert remark in capsys.readouterr().out.splitlines()

@@ -89,14 +89,15 @@ def test_effect_sizes_match_published_formulas() -> None:
 @pytest.mark.slow
 def test_failed_trials_are_excluded_and_reported() -> None:
     table = frame(-1.0)
-    table.loc[0, ["state", "tracking_error"]] = ["failed", np.nan]
+    table.loc[:2, "state"], table.loc[:2, "tracking_error"] = "failed", np.nan
+    table.loc[:2, "reason"] = ["out of reach", "out of reach", "it broke"]
     study = parse_study(
         {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}, "map": {"a": {}, "b": {}}}, "cost": "effort"},
         "",
     )
     found = statistics(table, FACTORS, (), ["tracking_error", "effort"], 1)
-    sentences = three_sentences(study, found, table, 1)
-    assert "of which 1 failed" in sentences[0]
+    sentences = three_sentences(study, found, table, 3)
+    assert "of which 3 failed (out of reach, and for 1 other reason)" in sentences[0]
     assert sentences[1].startswith("Tracking error, by guidance: lower (better) with river than with none")
     assert "no difference shown between river and none" in sentences[2]
 

@@ -130,6 +130,7 @@ def test_invalid_or_duplicate_levels_are_refused(levels: object, message: str) -
         ({"measures": ["speed"]}, "no measure 'speed'"),
         ({"run": {"figure": "none"}, "measures": ["fell"]}, "physical"),
         ({"run": {"figure": "none"}, "cost": "fell"}, "physical"),
+        ({"run": {"figure": "none"}, "ease": "expressiveness"}, "kinematic"),
     ],
 )
 def test_unavailable_measure_is_refused(values: dict[str, object], message: str) -> None:

@@ -28,6 +28,22 @@ def test_rows_round_trip_exactly(tmp_path: Path) -> None:
     assert back[:3] == ("k", "done", "")
 
 
+@pytest.mark.parametrize(
+    "change", ["measures = '{bad'", "measures = '[1]'", """measures = '{"effort": "much"}'""", "state = 'odd'"]
+)
+def test_damaged_row_is_named(tmp_path: Path, change: str) -> None:
+    with opened(tmp_path / "s.sqlite") as database:
+        database.add(row("k"), {"user": 3})
+    plain = sqlite3.connect(tmp_path / "s.sqlite", isolation_level=None)
+    plain.execute(f"UPDATE trials SET {change}")
+    plain.close()
+    with (
+        opened(tmp_path / "s.sqlite") as database,
+        pytest.raises(StudyError, match=r"row 'k'.* is damaged .* delete"),
+    ):
+        list(database.rows())
+
+
 def test_table_has_the_documented_schema(tmp_path: Path) -> None:
     with opened(tmp_path / "s.sqlite") as database:
         database.add(row("k"), {"user": 3})
