@@ -316,12 +316,13 @@ class Led(KernelMap):
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
-        return Led(*self._arguments[:-1], sway)
+        clip, limbs, phase, standing, capture, _ = self._arguments
+        return Led(clip, limbs, phase, standing, capture, sway)
 
     def begun_at(self, phase: float) -> "Led":
         """The same map with another phase of the lap at s = 0."""
-        clip, limbs, _, *others = self._arguments
-        return Led(clip, limbs, phase, *others)
+        clip, limbs, _, standing, capture, sway = self._arguments
+        return Led(clip, limbs, phase, standing, capture, sway)
 
     @property
     def nq(self) -> int:

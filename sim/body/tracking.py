@@ -81,7 +81,7 @@ class TrackedMotion(NamedTuple):
     ground : Array
         Ground reaction force on the figure [N], mean over a control period, shape (n, 3).
     weight, radius, com_height : float
-        Weight of the figure [N], radius of its contact spheres [m], and height of its centre of mass when it stands [m].
+        Weight of the figure [N], radius of its contact spheres [m], height of its centre of mass when it stands [m].
     warnings : int
         Number of MuJoCo's warnings.
     ends : float

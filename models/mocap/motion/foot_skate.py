@@ -46,7 +46,7 @@ class ContactSlide:
 
 
 class Rolling:
-    r"""How far spheres of radius r have rolled over the floor, :math:`\int r\,\omega \times e_z\,dt`, block by block."""
+    r"""How far spheres of radius r have rolled over the floor, :math:`\int r\,\omega \times e_z\,dt`, from blocks."""
 
     def __init__(self, radius: float) -> None:
         self._radius, self._last, self._so_far = radius, np.empty(0), np.zeros(3)
