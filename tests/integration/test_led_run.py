@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def assert_led_back(summary: dict[str, Any]) -> None:
-    """It stands, comes back within 1 cm and 3°; soles slide by less than 3 cm, the figure's by less than 4.5."""
+    """It stands, comes back within 1 cm and 3°; soles slide by less than 3 cm, the figure's likewise."""
     lead, figure = summary["lead"], summary["figure"]
     assert figure["fell_at"] is None
     assert lead["retrace_cm"] < 1.0
@@ -35,8 +35,7 @@ def assert_led_back(summary: dict[str, Any]) -> None:
     # SNU's run: 2.5°; the others: 2° at most.
     assert lead["physical_retrace_deg"] < 3.0
     assert lead["slide_cm"] < 3.0
-    # CMU 02_03: 2.80 to 2.99 cm by the seed; DeepMimic's run: 3.4 cm, 3.69 with Nehalem's kernels.
-    assert lead["physical_slide_cm"] < 4.5
+    assert lead["physical_slide_cm"] < 3.0  # DeepMimic's run: 1.7 to 2.1 cm along four paths
 
 
 def test_led_walk_retraces_its_path_within_1_cm_and_2_degrees(folder: Path) -> None:
@@ -74,7 +73,7 @@ def test_soles_keep_contact_and_support_bounds_the_turn_rate(folder: Path) -> No
     assert none == 0.0
     assert 20.0 < one < np.degrees(0.9) + 1e-6
     assert one < two < np.degrees(1.2) + 1e-6
-    assert summary["lead"]["physical_slide_cm"] < 3.0
+    assert summary["lead"]["physical_slide_cm"] < 1.5  # 0.6; with what the contact spheres roll 2.4
 
 
 # What is prepared rounds by the kernels of OpenBLAS: xia has 0.138 with Zen's and 0.142 with Nehalem's; with these

@@ -105,7 +105,7 @@ def test_prepare_returns_clip_and_measures(capture: Path, tmp_path: Path, monkey
     prepared = hvf.prepare(capture, tmp_path / "ready.bvh")
     assert "well-formed" in str(prepared)
     many = prepared._replace(flights=tuple(f"flight {k}" for k in range(7)))
-    assert "flight 2; 4 more flights are refuted, as the report lists" in str(many)
+    assert "flight 2\n  4 more flights are refuted, as the report lists" in str(many)
     assert "flight 3" not in str(many)
     assert set(many.flights) <= set(many.faults())
     np.testing.assert_allclose(hvf.load(tmp_path / "ready.bvh").poses, prepared.clip.poses, atol=1e-5)
