@@ -82,16 +82,17 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     config = resolved(config)
     _check_permit(config, options, console)
     content = content_of(config.device)
-    emulated_linkage = linkage_from(read_device_file(options.emulate) if options.emulate else content)
+    known = linkage_from(content)
+    emulated_linkage = linkage_from(read_device_file(options.emulate)) if options.emulate else known
     scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
     calibrated = options.emulate is None or not any(emulated_linkage.offset)
     if options.name == EMULATED:
         delay_in_steps(scene, emulated_linkage.delay)
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
     session = _compile_session(config, options, console)
-    job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene)
+    job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene, known)
     make = MakeServo(
-        served(config), options.name, _gate(config, options), linkage_from(content).offset, calibration_from(content),
+        served(config), options.name, _gate(config, options), known.offset, calibration_from(content),
         silent=options.silence,
     )  # fmt: skip
     with run_folder(options) as begin, contextlib.ExitStack() as stack:

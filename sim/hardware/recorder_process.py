@@ -22,6 +22,7 @@ from sim.hardware.shared import Ring, SharedNumbers
 from sim.hardware.twin import TWIN_CHANNELS, Twin
 from sim.recording.recorder import DiskFull, Group, Recorder
 from sim.recording.recording import RecordingError
+from sim.world.linkage import Linkage
 
 RECORDER_ROWS, RECORDER_DROPPED, RECORDER_ERROR, RECORDER_FORCE, RECORDER_APART = 0, 1, 2, 3, 6
 RECORDER_READY, RECORDER_SIZE = 7, 8
@@ -49,6 +50,8 @@ class RecordingJob:
         Likewise.
     scene : SceneConfig
         Parameters of the twin's world, including the servo's period.
+    linkage : Linkage
+        Friction and added inertia of the twin.
     """
 
     path: Path
@@ -56,6 +59,7 @@ class RecordingJob:
     static: Mapping[str, npt.ArrayLike | str]
     seed: int
     scene: SceneConfig
+    linkage: Linkage
 
 
 def hardware_groups(period: float) -> dict[str, Group]:
@@ -70,7 +74,7 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: Sh
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     status, order, parent = np.zeros(RECORDER_SIZE), np.zeros(1), parent_id()
-    twin = Twin(job.scene)
+    twin = Twin(job.scene, job.linkage)
     twin.follow(columns(np.zeros((0, ROW_SIZE))))
     try:
         with Recorder(job.path, job.config, job.seed, hardware_groups(job.scene.servo_period), job.static) as recorder:

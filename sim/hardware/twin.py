@@ -7,14 +7,15 @@ torques; the encoders then correct it, as in a Luenberger observer with a double
           \quad e = \theta - \theta^-
 
 The hand's torques τ_h are estimated by a generalised-momentum observer (De Luca & Mattone, ICRA 2005; De Luca et al.,
-IROS 2006): with p = M(θ) θ̇ and :math:`\dot p = \tau + C^T\dot\theta - N - D\dot\theta - f
-+ \tau_h`, f = f_c tanh(θ̇/ε),
+IROS 2006): with p = (M(θ) + I) θ̇, I the added inertia (`sim.world.linkage`), and :math:`\dot p = \tau + C^T\dot\theta
+- N - D\dot\theta - f + \tau_h`, f = f_c tanh(θ̇/ε),
 
 .. math:: r = K \left(p(t) - p(0) - \int (\tau + C^T\dot\theta - N - D\dot\theta - f + r)\,dt\right),
           \qquad \dot r = K (\tau_h - r)
 
 which needs no acceleration and is the hand's torque filtered by a first-order low-pass of rate K. The force is
 F = J⁻ᵀ r. It includes all model errors, above all of friction: at rest up to the Coulomb friction, 0.04 N at the tip.
+Friction and inertia are the published ones, or those of the device's file.
 """
 
 import math
@@ -28,10 +29,10 @@ from geometry.arrays import Array, IntArray
 from models.humanoid.skeleton import rest_pose
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import force_from_torques, forward_kinematics, linkage_angles, vector_to_hand_frame
-from models.phantom.parameters import PREMIUM_1_5
 from models.phantom.spec import LINKAGE_JOINTS, MOTORS
 from models.world.scene import PHANTOM, SceneConfig
 from sim.compilation.compiled import entry_point
+from sim.world.linkage import Linkage
 from sim.world.plant import Plant, make_plant, step
 from sim.world.world import World
 
@@ -47,13 +48,12 @@ TWIN_CHANNELS: dict[str, tuple[int, ...]] = {"predicted": (3,), "apart": (), "ha
 
 _LEAST_GAIN = 5e-5  # [m/rad] below it the hand's force cannot be determined and is zero: 50 µm from the turret's axis
 _INTEGRAL, _STARTED = 3, 6  # places in the memory of `momentum_residual`, which begins with r
-_VISCOUS, _COULOMB = PREMIUM_1_5.viscous_friction, PREMIUM_1_5.coulomb_friction
 
 
 @njit
 def momentum_residual(
-    memory: Array, theta: tuple[float, float, float], rate: tuple[float, float, float], torque: Array, period: float,
-    gain: float,
+    memory: Array, theta: tuple[float, float, float], rate: tuple[float, float, float], torque: Array,
+    joints: Array, period: float, gain: float,
 ) -> None:  # fmt: skip
     """Advance the residual r by one period (backward Euler in r).
 
@@ -65,17 +65,19 @@ def momentum_residual(
         Joint angles [rad] and rates [rad/s].
     torque : Array
         Torques during the previous period [N m], shape (3,).
+    joints : Array
+        Coulomb friction [N m], viscous friction [N m s/rad] and added inertia [kg m²] of the joints, shape (3, 3).
     period, gain : float
         T [s], K [1/s].
     """
     m, c, n = mass_matrix(theta), coriolis_matrix(theta, rate), gravity_torques(theta)
     for i in range(3):
-        momentum = m[i][0] * rate[0] + m[i][1] * rate[1] + m[i][2] * rate[2]
+        momentum = m[i][0] * rate[0] + m[i][1] * rate[1] + m[i][2] * rate[2] + joints[2, i] * rate[i]
         if memory[_STARTED] == 0.0:
             memory[_INTEGRAL + i] = momentum
             continue
         coriolis = c[0][i] * rate[0] + c[1][i] * rate[1] + c[2][i] * rate[2]
-        friction = _VISCOUS[i] * rate[i] + _COULOMB[i] * np.tanh(rate[i] / FRICTION_TRANSITION_RATE)
+        friction = joints[0, i] * np.tanh(rate[i] / FRICTION_TRANSITION_RATE) + joints[1, i] * rate[i]
         memory[_INTEGRAL + i] += period * (torque[i] + coriolis - n[i] - friction)
         memory[i] = gain * (momentum - memory[_INTEGRAL + i]) / (1.0 + gain * period)
         memory[_INTEGRAL + i] += period * memory[i]
@@ -99,6 +101,8 @@ class TwinMemory(NamedTuple):
         Observer gains on angle [1] and rate [1/s].
     theta, rate, torque : Array
         Joint angles [rad], rates [rad/s], and the torques since the last tick [N m], shape (3,).
+    joints : Array
+        Friction and added inertia of the joints, as in `momentum_residual`, shape (3, 3).
     residual : Array
         Memory of `momentum_residual`, shape (7,).
     last : Array
@@ -115,6 +119,7 @@ class TwinMemory(NamedTuple):
     theta: Array
     rate: Array
     torque: Array
+    joints: Array
     residual: Array
     last: Array
 
@@ -153,7 +158,7 @@ def follow_rows(
             twin.rate[i] += twin.of_rate * error
         q = (twin.theta[0], twin.theta[1], twin.theta[2])
         w = (twin.rate[0], twin.rate[1], twin.rate[2])
-        momentum_residual(twin.residual, q, w, twin.torque, twin.plant.period, RESIDUAL_GAIN)
+        momentum_residual(twin.residual, q, w, twin.torque, twin.joints, twin.plant.period, RESIDUAL_GAIN)
         a = vector_to_hand_frame(forward_kinematics((prediction[0], prediction[1], prediction[2])))
         b = vector_to_hand_frame(forward_kinematics((theta[k, 0], theta[k, 1], theta[k, 2])))
         apart[k] = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
@@ -171,10 +176,13 @@ class Twin:
     ----------
     scene : SceneConfig
         Parameters of its world; the servo period must be the device's.
+    linkage : Linkage
+        Friction and added inertia of the device.
     """
 
-    def __init__(self, scene: SceneConfig):
+    def __init__(self, scene: SceneConfig, linkage: Linkage):
         self._world = World(scene, "none")
+        linkage.into(self._world)
         self._world.reset(np.zeros(3), rest_pose())
         model, data = self._world.model, self._world.data
         joints = [model.joint(PHANTOM + name) for name in LINKAGE_JOINTS]
@@ -183,8 +191,8 @@ class Twin:
         self._memory = TwinMemory(
             make_plant(self._world), data.qvel, np.array([int(joint.qposadr[0]) for joint in joints]),
             np.array([int(joint.dofadr[0]) for joint in joints]), (a, b, c), 1.0 - pole**2,
-            (1.0 - pole) ** 2 / scene.servo_period, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7),
-            np.array([-2.0]),
+            (1.0 - pole) ** 2 / scene.servo_period, np.zeros(3), np.zeros(3), np.zeros(3),
+            np.array([linkage.coulomb, linkage.viscous, linkage.inertia]), np.zeros(7), np.array([-2.0]),
         )  # fmt: skip
 
     def follow(self, rows: Mapping[str, Array]) -> dict[str, Array]:

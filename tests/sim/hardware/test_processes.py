@@ -33,6 +33,7 @@ from sim.hardware.recorder_process import RecordingJob, record_rows
 from sim.hardware.servo_process import Ended, ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
+from sim.world.linkage import Linkage
 from tests.sim.hardware.process_factories import (
     PERIOD,
     emulated_device,
@@ -47,7 +48,7 @@ LATE_LIMIT, HEARTBEAT_LIMIT = 0.2, 0.6
 
 
 def job(path: Path) -> RecordingJob:
-    return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD))
+    return RecordingJob(path, {"kind": "test"}, {}, 1, SceneConfig(servo_period=PERIOD, physics_step=PERIOD), Linkage())
 
 
 def wait_until(run: HardwareRun, condition: Callable[[RunStatus], bool], seconds: float = 60.0) -> RunStatus:
