@@ -42,6 +42,7 @@ from experiments.setups.parts.defaults import resolved
 from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.library import embedded_names, load
 from models.mocap.motion.clip import Clip
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
@@ -129,7 +130,7 @@ def certify_into(
     if "region" in verdicts and "ellipse" in verdicts["region"].figures:
         plots[REGION_PLOT] = (region_figure(verdicts["region"]), "region of attraction")
     _write_certificate(certificate, plots, out)
-    (out / OPTIONS).write_text(json_text(certified_options(config, delay, hands, push)) + "\n", encoding="utf-8")
+    write_text(out / OPTIONS, json_text(certified_options(config, delay, hands, push)) + "\n")
     return certificate
 
 
@@ -186,9 +187,9 @@ def _write_certificate(certificate: Certificate, plots: Mapping[str, tuple[Figur
     for file, (figure, _) in plots.items():
         figure.savefig(out / file, dpi=150)
     shown = {file: shows for file, (_, shows) in plots.items()}
-    (out / PAGE).write_text(certificate_page(certificate, shown), encoding="utf-8")
+    write_text(out / PAGE, certificate_page(certificate, shown))
     text = json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n"
-    (out / CERTIFICATE).write_text(text, encoding="utf-8")
+    write_text(out / CERTIFICATE, text)
 
 
 def _field_verdicts(

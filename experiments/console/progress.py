@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Ta
 from rich.text import Text
 
 from sim.compilation.unit_cache import cache_folder
+from sim.compilation.whole_files import write_text
 
 _MIN_STORED_DURATION = 2.0  # [s]; shorter durations are not stored
 
@@ -93,8 +94,6 @@ def store_duration(what: str, seconds: float) -> None:
     """Store the duration of one unit of some work [s]; a file that cannot be written is ignored."""
     try:
         _durations_file().parent.mkdir(parents=True, exist_ok=True)
-        _durations_file().write_text(
-            json.dumps(_stored_durations() | {what: float(f"{seconds:.3g}")}), encoding="utf-8"
-        )
+        write_text(_durations_file(), json.dumps(_stored_durations() | {what: float(f"{seconds:.3g}")}))
     except OSError:
         return

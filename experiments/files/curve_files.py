@@ -7,6 +7,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 
 CURVE_FILE = "curve.json"
@@ -15,7 +16,7 @@ CURVE_FILE = "curve.json"
 def save_curve(curve: Trajectory, path: Path) -> None:
     """Write a curve as JSON: times [s], positions in H [m], quaternions wxyz, periodic, ends."""
     samples = {name: np.asarray(getattr(curve, name)).tolist() for name in ("times", "positions", "quaternions")}
-    path.write_text(json.dumps(samples | {"periodic": curve.periodic, "ends": curve.ends}) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(samples | {"periodic": curve.periodic, "ends": curve.ends}) + "\n")
 
 
 def load_curve(path: Path) -> Trajectory:

@@ -37,6 +37,7 @@ from experiments.results.folder import (
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
+from sim.compilation.whole_files import write_text
 from sim.devices.hardware_list import check_present
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun
@@ -106,7 +107,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         warnings = check_device(ready.identity, make.calibration, "inertia" in content)
         begin()
         # Only once the servo ticks, since a program that is killed earlier would leave them behind.
-        (options.out / CONFIG).write_text(to_json(config), encoding="utf-8")
+        write_text(options.out / CONFIG, to_json(config))
         if content:
             save_device(content, options.out / DEVICE)
         for line in (*warnings, *ready.said):
@@ -227,7 +228,7 @@ def _write_results(outcome: Outcome, remarks: tuple[str, ...], out: Path, consol
     if not holds_ticks(out / RECORDING):
         console.print(f"Nothing was recorded, so nothing is left in {out}.", highlight=False)
         return summary
-    (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
+    write_text(out / SUMMARY, json_text(summary) + "\n")
     written = [SUMMARY, RECORDING]
     if outcome.recorded:
         # Imported late, as it loads matplotlib.

@@ -18,6 +18,7 @@ from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRET
 from experiments.results.folder import RECORDING
 from experiments.results.pages.figures import STYLE
 from experiments.runs.run import run
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -112,7 +113,7 @@ def draw_all(out: Path, started: float, overwrite: bool = False) -> list[Path]:
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
         for drawing in bar.track(DRAWINGS):
             files.append(draw_one(drawing, runs, out))
-    (out / PAGE).write_text(_page(), encoding="utf-8")
+    write_text(out / PAGE, _page())
     console.print(f"Written to {out}: {PAGE} (open it in a browser), eight figures as PDF and PNG.", highlight=False)
     return files
 

@@ -13,6 +13,7 @@ from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.hints import Hints
+from sim.compilation.whole_files import write_text
 
 
 def prepare_file(
@@ -61,7 +62,7 @@ def prepare_file(
             from experiments.preparation.page import page  # late: matplotlib and viser
 
             report.mkdir(parents=True, exist_ok=True)
-            (report / f"prepare-{source.stem}.html").write_text(page(outcome, captured), encoding="utf-8")
+            write_text(report / f"prepare-{source.stem}.html", page(outcome, captured))
     return outcome
 
 

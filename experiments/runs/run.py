@@ -36,6 +36,7 @@ from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from models.mocap.readers.own_bvh import write_bvh_blocks
+from sim.compilation.whole_files import write_text
 from sim.loop.channels import groups, record_into, shown_configuration
 from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
@@ -82,7 +83,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     if cost_message is not None:
         console.print(cost_message, highlight=False)
     with claimed_and_cleared(out, overwrite):
-        (out / CONFIG).write_text(to_json(full_config), encoding="utf-8")
+        write_text(out / CONFIG, to_json(full_config))
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
@@ -96,7 +97,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
 
 def write_summary(out: Path, summary: RunSummary) -> None:
     """Write the summary of a run beside its recording."""
-    (out / SUMMARY).write_text(json_text(summary) + "\n", encoding="utf-8")
+    write_text(out / SUMMARY, json_text(summary) + "\n")
 
 
 def record(

@@ -24,6 +24,7 @@ from experiments.runs.run import write_animations, write_summary
 from experiments.setups.session import Session
 from geometry.arrays import Array
 from models.mocap.library import check_target
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -106,7 +107,7 @@ class Run:
             summary = record_session(session, folder, config, seconds, started, console)
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
-                (folder / CONFIG).write_text(to_json(session.config), encoding="utf-8")
+                write_text(folder / CONFIG, to_json(session.config))
             write_summary(folder, summary)
             run = Run(folder, summary, session)
             run.report()

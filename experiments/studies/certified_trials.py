@@ -18,6 +18,7 @@ from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 
 MAX_INITIAL_FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
@@ -140,7 +141,7 @@ def certified_trials(
         diverge = sum(r.diverges for r in releases)
         lines.append(f"| {name} | {len(releases)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
     out.mkdir(parents=True, exist_ok=True)
-    (out / "certified.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(out / "certified.md", "\n".join(lines) + "\n")
     print("\n".join(lines))
 
 

@@ -28,6 +28,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
+from sim.compilation.whole_files import write_text
 from sim.users.hand.arm import Arm
 
 SCALE, STIFFNESS_RATIO, WALKER_RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω [1/s]: the walker's motion is negligible
@@ -130,7 +131,7 @@ def leading_trials(out: Path = Path("runs/leading_trials")) -> None:
         )
         print(lines[-1], flush=True)
     out.mkdir(parents=True, exist_ok=True)
-    (out / "leading.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(out / "leading.md", "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

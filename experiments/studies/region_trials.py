@@ -23,6 +23,7 @@ from experiments.certify.certify import certified_rivers
 from experiments.certify.trial_simulation import FULL_CONDITIONS, Trial, hand_path
 from experiments.config.run_config import RunConfig
 from geometry.arrays import Array
+from sim.compilation.whole_files import write_text
 
 HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400  # of a simulation
@@ -114,7 +115,7 @@ def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, out
         print(lines[-1], flush=True)
     out.mkdir(parents=True, exist_ok=True)
     report = f"{verdict.reason}\n\n" + "\n".join(lines) + "\n"
-    (out / "region.md").write_text(report, encoding="utf-8")
+    write_text(out / "region.md", report)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from controllers.certificates.loop.stability import slowest_mode
 from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
+from sim.compilation.whole_files import write_text
 
 _WORLD_INTEGRATOR = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
@@ -110,12 +111,12 @@ def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44,
     again = observed(trials[worst], rows[worst].predicted, FINER)
     out.mkdir(parents=True, exist_ok=True)
     numbers = [{k: v if np.isfinite(v) else None for k, v in asdict(row).items()} for row in rows]
-    (out / "trials.json").write_text(json.dumps(numbers, indent=1) + "\n", encoding="utf-8")
+    write_text(out / "trials.json", json.dumps(numbers, indent=1) + "\n")
     report = table(rows) + (
         f"\nThe worst, trial {worst + 1}: {_error(rows[worst].observed, rows[worst].predicted)} at {FINE.substeps} "
         f"physics steps a period, {_error(again, rows[worst].predicted)} at {FINER.substeps}.\n"
     )
-    (out / "trials.md").write_text(report, encoding="utf-8")
+    write_text(out / "trials.md", report)
     trials_figure(rows).savefig(out / "trials.png", dpi=150)
     print(report)
 

@@ -25,6 +25,7 @@ from experiments.trials.execution.executors import executor
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from experiments.trials.trial.run_trial import Row
+from sim.compilation.whole_files import write_text
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -167,7 +168,7 @@ class Study:
             )
         failed = int(frame["state"].eq("failed").sum())
         result = StudyResult(folder, frame, found, sentences, ran, failed)
-        (folder / SUMMARY).write_text(result.to_json() + "\n", encoding="utf-8")
+        write_text(folder / SUMMARY, result.to_json() + "\n")
         return result
 
     def _refuse_fewer(self, folder: Path, database: Database) -> None:

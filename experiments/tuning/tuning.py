@@ -25,6 +25,7 @@ from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, best_candidate, distributions_of, search, signs_of, storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
+from sim.compilation.whole_files import write_text
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
 CERTIFICATE = "certificate"
@@ -145,7 +146,7 @@ def _write_results(
     config: TuneConfig, out: Path, text: str, found: Sequence[Candidate], best: Candidate, judged: Sequence[Contender]
 ) -> Tuned:
     tuned = judged[0]
-    (out / CHOSEN).write_text(to_json(tuned.config), encoding="utf-8")
+    write_text(out / CHOSEN, to_json(tuned.config))
     certificate = certify_into(tuned.config, out / CERTIFICATE)
     comparisons = compared(config, judged)
     importances = importances_of(config, found)
@@ -154,9 +155,9 @@ def _write_results(
     plots = [objectives_figure(config, found, best), gains_figure(config, found, best, others)]
     verdicts = {name: verdict.reason for name, verdict in certificate.verdicts.items()}
     page = tuning_page(config, text, sentences, judged, comparisons, importances, plots, verdicts)
-    (out / REPORT).write_text(page, encoding="utf-8")
+    write_text(out / REPORT, page)
     result = Tuned(out, best.values, tuple(found), tuple(comparisons), importances, sentences)
-    (out / SUMMARY).write_text(result.to_json() + "\n", encoding="utf-8")
+    write_text(out / SUMMARY, result.to_json() + "\n")
     return result
 
 

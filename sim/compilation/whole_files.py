@@ -31,6 +31,12 @@ def atomic_file(path: Path) -> Generator[BinaryIO]:
         raise
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, UTF-8, atomically; raises as `atomic_file`."""
+    with atomic_file(path) as file:
+        file.write(text.encode())
+
+
 _HASH_SIZE = hashlib.sha256().digest_size
 
 

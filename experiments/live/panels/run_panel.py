@@ -9,7 +9,7 @@ import viser
 from experiments.config.maps import MAPS, Led, MapFile, RobotArm
 from experiments.config.modes import MODES
 from experiments.config.options import run_config
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import RunConfig, meaningless_options
 from experiments.live.panels import Acts
 from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 from experiments.live.session.messages import Built
@@ -32,12 +32,12 @@ class RunPanel:
     Parameters
     ----------
     config : RunConfig
-        The initial choice; its device and rates are those of every run.
+        The initial choice; its device, rates, seed and size of the figure are those of every run.
     """
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts, config: RunConfig):
         self._gui, self._desk, self._acts = gui, desk, acts
-        self._device, self._clock = config.device, config.clock
+        self._initial = config
         modes = tuple(mode.__pydantic_fields__["kind"].default for mode in MODES)  # pyright: ignore
         maps = tuple(kind.__pydantic_fields__["kind"].default for kind in MAPS if kind is not RobotArm)  # pyright: ignore
         self._file = config.map.file if isinstance(config.map, MapFile) else ""
@@ -71,7 +71,16 @@ class RunPanel:
             options["map"] = self._file
         else:
             options |= {"map": "" if mode == "lead" else map_kind, "clips": self._clip_names()}
-        return replace(run_config(mode=mode, **options), device=self._device, clock=self._clock)
+        chosen, initial = run_config(mode=mode, **options), self._initial
+        idle = meaningless_options(chosen.body, chosen.leads)
+        sizes = {name: getattr(initial.figure, name) for name in ("stature", "mass") if name not in idle}
+        return replace(
+            chosen,
+            figure=replace(chosen.figure, **sizes),
+            device=initial.device,
+            clock=initial.clock,
+            seed=initial.seed,
+        )
 
     def show(self, built: Built) -> None:
         """Set the choice to the current run."""

@@ -16,6 +16,7 @@ from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
 from experiments.setups.session import default_poses
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import peak_memory_mb
@@ -108,7 +109,7 @@ class Take:
             save_curve(tubes.edited(engine.memory), self.folder / CURVE_FILE)
         results = asdict(replace(summary, remarks=session.remarks)) | {"lines": lines}
         self._recorder.close(results)
-        (self.folder / SUMMARY).write_text(json_text(results) + "\n", encoding="utf-8")
-        (self.folder / CONFIG).write_text(to_json(engine.config), encoding="utf-8")
+        write_text(self.folder / SUMMARY, json_text(results) + "\n")
+        write_text(self.folder / CONFIG, to_json(engine.config))
         write_animations(self.folder, session)
         return tuple(lines)

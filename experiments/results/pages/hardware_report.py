@@ -13,6 +13,7 @@ from controllers.safety.faults import Fault
 from experiments.files.html_page import html_page, image
 from experiments.results.folder import FIGURES, REPORT
 from experiments.results.pages.figures import AXES, save_figures, shade, thinned_rows
+from sim.compilation.whole_files import write_text
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 
@@ -38,7 +39,7 @@ def write_hardware_report(folder: Path, recording: Recording, lines: Sequence[st
     items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
     body = f"<ul>{items}</ul>{''.join(images)}"
     page = html_page(f"{recording.texts['title']}, on a device", body, _PAGE_STYLE)
-    (folder / REPORT).write_text(page, encoding="utf-8")
+    write_text(folder / REPORT, page)
 
 
 def forces_figure(recording: Recording) -> Figure:

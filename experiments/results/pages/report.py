@@ -17,6 +17,7 @@ from experiments.results.pages.figures import draw_figures, save_figures
 from experiments.results.pages.hardware_report import write_hardware_report
 from experiments.results.pages.mode_figures import arm_figure, lead_figure, stretch_figure
 from experiments.results.pages.plots import plots_html
+from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER
@@ -138,7 +139,7 @@ def write_report(
         versions=html.escape(", ".join(f"{name} {number}" for name, number in recording.versions.items())),
         seed=recording.seed,
     )
-    path.write_text(html_page(title, body, _STYLE), encoding="utf-8")
+    write_text(path, html_page(title, body, _STYLE))
 
 
 def _curve_legend(recording: Recording, tube: str) -> str:

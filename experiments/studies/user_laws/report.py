@@ -14,6 +14,7 @@ from experiments.studies.user_laws.holding import grip, step_response, tremor
 from experiments.studies.user_laws.law import Law, Study
 from experiments.studies.user_laws.practice import endurance, practice
 from experiments.studies.user_laws.tracing import power_law, steering
+from sim.compilation.whole_files import write_text
 from sim.users.person.person import Person
 from sim.users.person.population import population
 
@@ -75,7 +76,7 @@ def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwri
     out.mkdir(parents=True, exist_ok=True)
     laws = [law for study in studies for law in study.laws]
     rows = [asdict(law) | {"holds": law.holds} for law in laws]
-    (out / TABLE).write_text(json_text({"people": people, "seed": seed, "laws": rows}) + "\n", encoding="utf-8")
+    write_text(out / TABLE, json_text({"people": people, "seed": seed, "laws": rows}) + "\n")
     for study in studies:
         draw(study, out / f"{study.key}.png")
     return laws

@@ -18,6 +18,7 @@ from experiments.trials.analysis.trial_table import measured_columns
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
+from sim.compilation.whole_files import write_text
 
 _BODY = """<p>{question}</p>
 {sentences}
@@ -159,7 +160,7 @@ def write_report(
     replay_measure = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
     shown = replays(tuple(trials), frame, replay_measure) if replay_measure else ()
     counts = {str(reason): int(count) for reason, count in failures.items()}
-    path.write_text(_page(study, text, said, found, plots, counts, shown, made), encoding="utf-8")
+    write_text(path, _page(study, text, said, found, plots, counts, shown, made))
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
     pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)

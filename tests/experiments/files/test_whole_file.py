@@ -1,6 +1,8 @@
 """Atomic writing of files: an unfinished file is never visible, and an interrupt keeps the old content."""
 
 import errno
+import resource
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from experiments.files.device_files import save_device
 from experiments.files.map_files import write_arrays
 from experiments.lifting import lift_report
 from sim.compilation import whole_files as whole
-from sim.compilation.whole_files import atomic_file
+from sim.compilation.whole_files import atomic_file, write_text
 
 
 def test_file_appears_only_once_closed(tmp_path: Path) -> None:
@@ -56,6 +58,21 @@ def test_interrupted_write_keeps_the_old_content(tmp_path: Path, before: bytes |
     with pytest.raises(interruption if isinstance(interruption, type) else OSError):
         _interrupted(path, interruption)
     assert [entry.read_bytes() for entry in tmp_path.iterdir()] == ([] if before is None else [before])
+
+
+def test_text_for_which_the_disk_is_too_small_leaves_the_old_one(tmp_path: Path) -> None:
+    path, limits = tmp_path / "report.html", resource.getrlimit(resource.RLIMIT_FSIZE)
+    write_text(path, "old")
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_text(path, "new" * 1000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_interrupted_archive_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
