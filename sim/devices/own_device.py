@@ -130,7 +130,7 @@ class TipDriver:
         if pose is None:
             return False
         fresh = self._reading
-        position, orientation, pressed = self._guarded(lambda: _checked(pose))
+        position, orientation, pressed = self._guarded(lambda: _checked(pose), f"{self.identity.transport}, read")
         write_pose(fresh, np.array(R_HP).T @ position, orientation)
         self.telemetry[READ] += 1.0
         fresh[READING_SWITCH], fresh[READING_CLOCK] = float(pressed), self._clock()
@@ -171,12 +171,12 @@ class TipDriver:
         with contextlib.suppress(DriverFault):
             self._guarded(self._device.close)
 
-    def _guarded(self, call: Callable[[], _Result]) -> _Result:
-        """The result of a call of the user's code; an error in it is printed once, and becomes a fault."""
+    def _guarded(self, call: Callable[[], _Result], where: str = "") -> _Result:
+        """The result of a call; an error in it, in the user's code or `where`, is printed once, and becomes a fault."""
         try:
             return call()
         except Exception as error:
-            words = _error_words(error)
+            words = _error_words(error, where)
             if words not in self._printed:
                 self._printed.append(words)
                 print(f"\n{words}", file=sys.stderr, flush=True)
@@ -184,12 +184,12 @@ class TipDriver:
             raise DriverFault(fault, self._printed.index(words) + 1.0, words) from None
 
 
-def _error_words(error: BaseException) -> str:
-    """File, line and error, in one line."""
+def _error_words(error: BaseException, where: str = "") -> str:
+    """Where it happened, by default file and line, and the error, in one line."""
     if isinstance(error, SyntaxError):
         return f"{error.filename}:{error.lineno}: SyntaxError: {error.msg}"
-    where = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{where.filename}:{where.lineno}: {type(error).__name__}: {' '.join(str(error).split())}"
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{where or f'{frame.filename}:{frame.lineno}'}: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def _checked(pose: TipPose) -> TipPose:

@@ -98,6 +98,13 @@ def test_exception_or_invalid_pose_is_a_fault_without_reading(pose, fault) -> No
     assert not reading.any()
 
 
+@pytest.mark.parametrize("pose", [TipPose(np.zeros(2)), TipPose(np.zeros(3), pressed="no"), "here"])
+def test_wrong_pose_is_reported_at_the_read_of_the_device(pose) -> None:
+    with pytest.raises(DriverFault) as refused:
+        TipDriver(Scripted(pose), "own.py:Scripted").read(np.zeros(9), 0.0)
+    assert refused.value.detail.startswith("own.py:Scripted, read: ")
+
+
 def test_exception_is_printed_once(capsys) -> None:
     driver = TipDriver(Scripted(ValueError("a bad cable")), "here")
     for _ in range(3):

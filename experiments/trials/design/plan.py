@@ -57,6 +57,7 @@ def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
     """
     people = population(study.users.number, study.users.seed)
     bases = {number: _base_config(study, people[0], condition) for number, condition in enumerate(conditions(study))}
+    _check_used(study)
     _check_distinct(study, bases)
     trials: list[Trial] = []
     for design in design_trials(study):
@@ -129,6 +130,16 @@ def _base_config(study: StudyConfig, person: Person, condition: Condition) -> Ru
         raise StudyError(f"study {study.name!r}, condition {level_text}: {to_keywords(str(error))}") from None
     except TypeError as error:
         raise StudyError(f"study {study.name!r}: {error}; expected options of a run, as in `hvf run --help`") from None
+
+
+def _check_used(study: StudyConfig) -> None:
+    """Refuse an option of all trials that every condition replaces."""
+    for name, value in study.run.items():
+        if all(name in condition.words for condition in conditions(study)):
+            raise StudyError(
+                f"study {study.name!r}: [run] has {name} = {value}, which every condition replaces; expected it there or "
+                "in the levels of a factor"
+            )
 
 
 def _check_distinct(study: StudyConfig, bases: Mapping[int, RunConfig]) -> None:

@@ -86,6 +86,10 @@ def test_trial_key_depends_on_device_file_content(tmp_path: Path) -> None:
         ({"between": ["stiffness"], "users": {"number": 1}}, "2 groups between users and 1 users"),
         ({"repetitions": 10**11}, "100000000000 repetitions are too many; expected at most 1000000 trials"),
         ({"factors": {f"f{k}": {str(n): {} for n in range(10)} for k in range(12)}}, "1000000000000 conditions"),
+        (
+            {"factors": {"stiffness": [100, 200]}, "run": {"stiffness": 300}},
+            "stiffness = 300, which every condition replaces",
+        ),
         ({"run": {"seconds": 3}}, "sets 'seconds' as an option of its runs"),
         ({"factors": {"clips": {"a": {"clips": ["gone.bvh"]}, "b": {"clips": ["walk"]}}}}, "gone.bvh"),
         ({"factors": {"arm": {"a": {"device_file": "gone.json"}, "b": {"device_file": "no.json"}}}}, "gone.json"),
