@@ -21,11 +21,10 @@ from typing import Annotated, Any
 
 import tyro
 
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ParameterError
 from experiments import commands
 from experiments.config.keywords import option_message
-from models.errors import ModelError
-from sim.errors import SimError
+from geometry.errors import HvfError
 
 _DESCRIPTION = f"{__doc__} hvf --version prints the version."
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
@@ -77,7 +76,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return command()
     except BrokenPipeError:
         raise
-    except (ModelError, ControllerError, SimError) as error:
+    except HvfError as error:
         print(f"hvf: {option_message(error)}", file=sys.stderr)
         return 2
     except OSError as error:

@@ -182,7 +182,7 @@ def lift_into(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         As `lift_clips`; or if an argument is of the wrong kind, or the file is not a .npz or exists and is not to be
         replaced.
     OSError
