@@ -39,6 +39,7 @@ from experiments.runs.sweep import Swept, sweep
 from experiments.setups.parts.pace import paced
 from experiments.trials.study import Study
 from experiments.tuning.tune import Search, tune
+from geometry.errors import HvfError
 from models.errors import ModelError
 from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
@@ -65,6 +66,7 @@ __all__ = [
     "HandState",
     "HapticMap",
     "HigherOrder",
+    "HvfError",
     "KernelMap",
     "Law",
     "Lifted",

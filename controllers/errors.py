@@ -1,8 +1,10 @@
 """Errors raised for invalid curves, fields, maps and gains."""
 
+from geometry.errors import HvfError
 
-class ControllerError(ValueError):
-    """Base of the errors of this package: says what is wrong and what would be right."""
+
+class ControllerError(HvfError):
+    """Base of the errors of this package."""
 
 
 class ParameterError(ControllerError):

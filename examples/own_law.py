@@ -21,6 +21,6 @@ sim = hvf.Simulation(
 )
 lowest = 1e3 * sim.run(1.0).ticks["p"][:, 2].min()
 print(f"the stylus stays above {lowest:.2f} mm")
-print(hvf.certify(sim).stability.reason)  # floor branches, so nothing is certain of it
+print(hvf.certify(sim).stability.reason)  # of both branches of floor, and of switching between them
 without = hvf.Simulation(field=hvf.Follow(curve, k_r=300, b_d=8) + level, haptic_map=sim.haptic_map)
 print(hvf.certify(without).stability.reason)

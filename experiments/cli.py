@@ -21,11 +21,10 @@ from typing import Annotated, Any
 
 import tyro
 
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ParameterError
 from experiments import commands
 from experiments.config.keywords import option_message
-from models.errors import ModelError
-from sim.errors import SimError
+from geometry.errors import HvfError
 
 _DESCRIPTION = f"{__doc__} hvf --version prints the version."
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
@@ -77,7 +76,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return command()
     except BrokenPipeError:
         raise
-    except (ModelError, ControllerError, SimError) as error:
+    except HvfError as error:
         print(f"hvf: {option_message(error)}", file=sys.stderr)
         return 2
     except OSError as error:
@@ -179,9 +178,9 @@ def _join_axis_values(words: Sequence[str]) -> list[str]:
 
 def _shorten_message(message: str, words: Sequence[str]) -> str:
     """Text of tyro's first box in one line: option, value, what is expected; and where to read more."""
-    lines = itertools.dropwhile(_is_rule, [line.strip("│ ") for line in message.splitlines()][1:])  # without the title
+    lines = list(itertools.dropwhile(_is_rule, [line.strip("│ ") for line in message.splitlines()][1:]))  # no title
     first = " ".join(itertools.takewhile(lambda line: not _is_rule(line), lines)) or " ".join(message.split())
-    first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ")
+    first = re.sub(r"^Error parsing [^:]+: ", "", first).rstrip(". ") + _suggestion(lines)
     for pattern, expected in _VALUE_ERRORS:
         match = re.search(pattern, first)
         if match is not None:
@@ -193,12 +192,25 @@ def _shorten_message(message: str, words: Sequence[str]) -> str:
     command = words[0] if words and words[0] in commands.NAMES else "COMMAND"
     rewordings = (
         (r"PATH (.+?)\. \(required\)", r"PATH (\1),"),
+        (r"^Unrecognized options: ([^-].*; expected one of )", r"no such command: \1"),
         (r"^Missing value for argument '(-\S+)'.*", r"nothing is given after \1; expected a value"),
         (r"^Missing value for argument '.*", f"missing from hvf {command}: PATH, or an option is mistyped"),
     )
     for pattern, better in rewordings:
         first = re.sub(pattern, better, first).rstrip(",")
     return f"{first[0].lower()}{first[1:]}; hvf {command} --help lists the options"
+
+
+def _suggestion(lines: Sequence[str]) -> str:
+    """What tyro suggests below its message: commands, or options with similar names."""
+    text = " ".join(line for line in lines if not _is_rule(line))
+    if found := re.search(r"Available subcommands: (.*?) For full helptext", text):
+        return f"; expected one of {found[1]}"
+    below = itertools.dropwhile(lambda line: not line.startswith("Perhaps you meant"), lines)
+    similar = [
+        line.split()[0] for line in itertools.takewhile(lambda line: not _is_rule(line), below) if line[:2] == "--"
+    ]
+    return f"; perhaps {' or '.join(similar)} is meant" if similar else ""
 
 
 def _is_rule(line: str) -> bool:

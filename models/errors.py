@@ -1,5 +1,7 @@
 """Errors of models and motion files."""
 
+from geometry.errors import HvfError
 
-class ModelError(ValueError):
-    """Base of the errors of this package: says what is wrong, where, and what would be right."""
+
+class ModelError(HvfError):
+    """Base of the errors of this package."""

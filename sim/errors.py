@@ -1,5 +1,7 @@
 """The base error of this package: faults of a world, a device, a run or a recording."""
 
+from geometry.errors import HvfError
 
-class SimError(ValueError):
-    """Base class of this package's errors: the message says what is wrong, where, and what was expected."""
+
+class SimError(HvfError):
+    """Base of the errors of this package."""

@@ -134,6 +134,13 @@ def test_links_and_pictures_of_page_exist(page: Path) -> None:
             assert (page.parent / target).exists(), f"{target} is not there; pages of that name: {moved}"
 
 
+@pytest.mark.parametrize("model", sorted((ROOT / "models").rglob("*.xml")), ids=lambda path: path.stem)
+def test_page_of_model_shows_it_and_the_source_of_its_numbers(model: Path) -> None:
+    page = (model.parent / "README.md").read_text(encoding="utf-8")
+    assert re.search(r"^!\[.*\]\(\w+\.png\)", page, re.MULTILINE)
+    assert "| source |" in page
+
+
 SOURCE = re.compile(r"`((?:controllers|experiments|models|sim|tests|examples|docs)/[\w/.-]+)(?::(\w+))?`")
 
 

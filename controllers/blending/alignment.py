@@ -20,7 +20,8 @@ _MAX_LEAD = int(MAX_LEAD * _SAMPLES)
 _MAX_PACE_CHANGE = 0.25  # largest change of the pace by a warp
 # Weight of stance relative to rotations: a blend of cheer and ginga slides 1.0 cm, also with half of it; twice: 0.7.
 _STANCE_WEIGHT = 2.0
-_STANCE_HEIGHT, _STANCE_SPEED = 0.02, 0.5  # [m], [m per lap] height and speed at which the degree of stance is halved
+# [m], [m per lap] height and speed at which the degree of stance is halved
+_HALF_STANCE_HEIGHT, _HALF_STANCE_SPEED = 0.02, 0.5
 # A warp that leaves more of the mismatch is not used: if every pair were warped, a few percent would be gained, and
 # flights would be distorted (accelerations up to 2.8 times the clip's own).
 _MAX_MISMATCH_RATIO = 0.9
@@ -50,8 +51,8 @@ def _stance_degree(channels: Array, drift: Array, limb: Limb) -> Array:
     across = drift[2] * np.stack([-place[:, 1], place[:, 0]], axis=1)
     # The velocity over the ground is that of the drift plus that in the frame of the drift.
     speed = np.linalg.norm(0.5 * _SAMPLES * (ahead - behind)[:, :2] + drift[:2] + across, axis=1)
-    low = 1.0 / (1.0 + ((height - height.min()) / _STANCE_HEIGHT) ** 2)
-    return low / (1.0 + (speed / _STANCE_SPEED) ** 2)
+    low = 1.0 / (1.0 + ((height - height.min()) / _HALF_STANCE_HEIGHT) ** 2)
+    return low / (1.0 + (speed / _HALF_STANCE_SPEED) ** 2)
 
 
 def _best_shift(reference: Array, features: Array) -> int:

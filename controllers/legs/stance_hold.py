@@ -33,7 +33,7 @@ from geometry.vectors import Quaternion
 
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
 # 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.
-_SWING_HEIGHT = 0.006
+_RELEASE_HEIGHT = 0.006
 # Σ w² above which μ falls, and where it is 0: for two clips, weights 0.72 and 0.985
 _MIXED_SQUARES, _ALONE_SQUARES = 0.6, 0.97
 # κ [1/rad], and the additional rate where a clip is alone. In the example at `_MAX_OFFSET` the slide stays 0.3 cm with
@@ -149,7 +149,7 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
     turn = _yaw(frame[2] + state[_OFFSET + 2], q)
     low = _turn_sole(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stance = _step_down(end[2] + low - ground, STANCE_HEIGHT, _SWING_HEIGHT)
+    stance = _step_down(end[2] + low - ground, STANCE_HEIGHT, _RELEASE_HEIGHT)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MAX_OFFSET**2 + (state[_OFFSET + 2] / _MAX_TURN) ** 2
     hold = stance * mixture * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0

@@ -1,12 +1,14 @@
 """Benchmarks of speed, as ratios measured within one run: ``make bench``."""
 
 import json
+import os
+import resource
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.map_feed import Maps, feed_maps, unlinked_maps
 from controllers.fields.algebra.program import Compiled, evaluate
+from controllers.fields.follow import follow_wrench
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
@@ -106,6 +109,9 @@ def benchmark_results() -> Iterator[BenchmarkResult]:
     yield BenchmarkResult(
         "second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0
     )
+    yield BenchmarkResult(
+        "recompilation after a change in one law / a cold start, processor time", recompilation_ratio(), at_most=0.1
+    )
     yield BenchmarkResult("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
     made, verified = certificate_seconds()
     yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
@@ -157,6 +163,26 @@ def second_start_seconds() -> float:
     return float(summary["speed"]["first_tick_seconds"])
 
 
+def recompilation_ratio() -> float:
+    """Processor time of a run with one law to compile, beyond that of a warm one, over that of a cold one.
+
+    A unit is kept by its content (`sim.compilation.unit_key`), so that of a law that changes is missing.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"HVF_CACHE_DIR": f"{folder}/cache"}
+
+        def processor_seconds() -> float:
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            _command_seconds("run", "--seconds", "0.1", "--overwrite", "--out", f"{folder}/run", env=environment)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+        cold, warm = processor_seconds(), processor_seconds()
+        (law,) = Path(folder, "cache").rglob(f"*.{follow_wrench.__name__}-*.unit")
+        law.unlink()
+        return (processor_seconds() - warm) / cold
+
+
 def certificate_seconds() -> tuple[float, float]:
     """Times in which new processes certify the demo's field, and verify the certificate [s]."""
     with tempfile.TemporaryDirectory() as folder:
@@ -176,9 +202,9 @@ def lifting_seconds() -> float:
         return _command_seconds("lift", *map(str, files), "--out", str(Path(folder) / "map.npz"))
 
 
-def _command_seconds(*arguments: str) -> float:
+def _command_seconds(*arguments: str, env: Mapping[str, str] | None = None) -> float:
     begin = time.perf_counter()
-    subprocess.run([sys.executable, "-m", "experiments.cli", *arguments], check=True, capture_output=True)
+    subprocess.run([sys.executable, "-m", "experiments.cli", *arguments], check=True, capture_output=True, env=env)
     return time.perf_counter() - begin
 
 

@@ -18,7 +18,7 @@ from controllers.safety.limiter import ForceLimiter
 from experiments.config.modes import Lead
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes.lead import leading
-from experiments.setups.parts.led_figure import led_map
+from experiments.setups.parts.led_figure import is_authored, led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.motion.clip import Clip
 
@@ -39,7 +39,7 @@ def leading_field(config: RunConfig, mode: Lead, clip: Clip) -> Leading:
         If a number is out of its interval, or the clip cannot be led.
     """
     figure = figure_model(config.scene.stature, config.scene.mass)
-    return leading(mode, led_map(clip, figure)[1])
+    return leading(mode, led_map(clip, figure, is_authored(config))[1])
 
 
 def leading_regimes(field: Leading) -> dict[str, list[Regime]]:

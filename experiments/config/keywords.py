@@ -10,9 +10,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar, cast
 
-from controllers.errors import ControllerError
-from models.errors import ModelError
-from sim.errors import SimError
+from geometry.errors import HvfError
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _OPTION_PATTERN = re.compile(
@@ -60,7 +58,7 @@ def with_keyword_messages(**others: str) -> Callable[[_F], _F]:
         def wrapper(*arguments: Any, **given: Any) -> Any:
             try:
                 return function(*arguments, **given)
-            except (ControllerError, ModelError, SimError) as error:
+            except HvfError as error:
                 vars(error).setdefault(_ORIGINAL_MESSAGE, str(error))
                 error.args = (to_keywords(str(error), **others),)
                 raise

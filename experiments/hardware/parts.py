@@ -50,7 +50,7 @@ def session_of(config: RunConfig, ready: Ready = lambda units: None, silent: flo
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         As `experiments.setups.wiring.wire`.
     """
     cutoff = phantom_of(config.device).cutoff

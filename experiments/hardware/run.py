@@ -69,7 +69,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If there is no such device, an option has no meaning on it, it may not be armed with this field, or another run
         is being written into the folder. The folder is then left unchanged.
     """

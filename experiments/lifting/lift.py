@@ -116,7 +116,7 @@ def lift_clips(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If a clip cannot be read or lifted, or the Phantom does not reach the room.
     """
     unknown = [name for name in cyclic if name not in names]

@@ -70,12 +70,9 @@ class LiftReport(NamedTuple):
         lines += [f"  {remark}" for remark in not_blendable(self.lifted.clips)]
         quality = self.quality
         if len(names) > 1:
-            on, between = quality.conditioning, quality.conditioning_between
-            # Within the core of a curve only its clip plays, so the map may be singular there.
-            along = f"{on[0]:.1f} in the median, 9 of 10 below {on[1]:.0f}" if np.isfinite(on[1]) else "singular"
+            along, between = map(_conditioning_text, (quality.conditioning, quality.conditioning_between))
             lines += [
-                f"Condition number of h_* along the curves: {along}; half way between: {between[0]:.1f} in the median, "
-                f"9 of 10 below {between[1]:.0f}.",
+                f"Condition number of h_* along the curves: {along}; half way between: {between}.",
                 f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
                 f"{100 * quality.roughness[1]:.0f} %.",
             ]
@@ -119,6 +116,16 @@ def _same_motion_groups(pairs: Sequence[tuple[int, int]]) -> list[list[int]]:
         if not any(first in others for others in groups.values()):
             groups.setdefault(first, [first]).append(second)
     return list(groups.values())
+
+
+def _conditioning_text(quantiles: tuple[float, float]) -> str:
+    """Median and 90th percentile of condition numbers in words.
+
+    A map is singular within the core of a curve, where only its clip plays, and everywhere if it has two clips, which
+    differ in one direction only.
+    """
+    median, p90 = quantiles
+    return f"{median:.1f} in the median, 9 of 10 below {p90:.0f}" if np.isfinite(p90) else "singular"
 
 
 def _separation(measure: ArrangementMeasure) -> str:
@@ -182,7 +189,7 @@ def lift_into(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         As `lift_clips`; or if an argument is of the wrong kind, or the file is not a .npz or exists and is not to be
         replaced.
     OSError

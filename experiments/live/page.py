@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from controllers.errors import ControllerError
 from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import open_cap_hand
@@ -26,10 +25,9 @@ from experiments.live.panels.takes_panel import TakesPanel
 from experiments.live.session.desk import Desk
 from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
 from geometry.arrays import Array
-from models.errors import ModelError
+from geometry.errors import HvfError
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
-from sim.errors import SimError
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import Moment, courses
@@ -113,7 +111,7 @@ class Page:
                 self._show_messages(before)
                 try:
                     does(event)
-                except (ControllerError, ModelError, SimError, OSError) as error:
+                except (HvfError, OSError) as error:
                     self.say(str(error))
                 own_messages[:] = [one for one in self._messages if one not in before]
 

@@ -69,7 +69,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If something about the configuration or a file is wrong; the folder is then left unchanged.
     """
     console = Console(stderr=True)

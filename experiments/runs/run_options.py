@@ -43,7 +43,7 @@ def run(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If an option is unknown or does not belong to the chosen parts, a number is out of its interval, a file cannot
         be read, or the folder cannot be written or holds a run.
     """

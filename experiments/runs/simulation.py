@@ -169,7 +169,7 @@ class Simulation:
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If a part is of another kind, the rates are not multiples of each other, or a replayed hand has a user.
     """
 
@@ -219,7 +219,7 @@ class Simulation:
 
         Raises
         ------
-        ModelError, ControllerError, SimError
+        HvfError
             If its parts do not fit together.
         """
         check_kind("seconds", seconds, float | None)
@@ -266,7 +266,7 @@ class Simulation:
 
         Raises
         ------
-        ModelError, ControllerError, SimError
+        HvfError
             If the parts do not fit together, or the folder cannot be written or holds a run.
         """
         check_kind("seconds", seconds, float)

@@ -59,7 +59,7 @@ def sweep(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         Before the first run, if there is no such parameter, or several laws have it; it has no values, or one that it
         cannot have; there is no thread; or an argument is of another kind.
     """

@@ -69,7 +69,7 @@ def map_parts(config: RunConfig, body: MjModel, clips: tuple[Clip, ...] | None =
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If there is no such clip, file or curve, or the Phantom does not reach the curve.
     """
     played, remarks = clips_for(config.map) if clips is None else (clips, ())

@@ -80,7 +80,7 @@ def wire(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
     config = resolved(config)
@@ -115,7 +115,7 @@ def wire_parts(
 
     Raises
     ------
-    ModelError, ControllerError, SimError
+    HvfError
         As `wire`.
     """
     draft = parts_of(maps)

@@ -137,7 +137,7 @@ class Study:
 
         Raises
         ------
-        ModelError, ControllerError, SimError, OSError
+        HvfError, OSError
             If the study contradicts itself, cannot go on, or has fewer users or repetitions than the folder; completed
             trials are kept.
         """

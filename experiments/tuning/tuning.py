@@ -107,7 +107,7 @@ def run_tuning(config: TuneConfig, out: Path, text: str = "", where: Where | Non
 
     Raises
     ------
-    ModelError, ControllerError, SimError, OSError
+    HvfError, OSError
         If it contradicts itself, or cannot go on; completed trials are kept.
     """
     console, text = Console(stderr=True), text or to_json(config)

@@ -18,17 +18,16 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from controllers.errors import ControllerError, ParameterError
+from controllers.errors import ParameterError
 from controllers.safety.arming import NO_REQUEST
 from controllers.safety.faults import Fault
 from geometry.arrays import Array, IntArray
-from models.errors import ModelError
+from geometry.errors import HvfError
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
 from sim.compilation.memory_access import items
 from sim.compilation.sequence_lock import read_whole, write_whole
 from sim.devices.driver import LOST, REFUSED, DeviceIdentity
-from sim.errors import SimError
 from sim.hardware.duration_histogram import DurationHistogram, Quantiles, add_duration
 from sim.hardware.gated_servo import COMPUTE, LATENESS, GatedServo, Ticker
 from sim.hardware.process_start import parent_id
@@ -141,7 +140,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
     signal.signal(signal.SIGTERM, _exit_on_signal)
     try:
         parts = make()
-    except (SimError, ControllerError, ModelError, OSError) as error:
+    except (HvfError, OSError) as error:
         channels.reports.send(Refused(str(error)))
         return
     process = ServoProcess(Ticker(parts), channels, clock)

@@ -39,7 +39,9 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
         (["run", "--bogus", "1"], "unrecognized options: --bogus, 1; hvf run --help"),
         (["certify", "--no-no-hand"], "unrecognized options: --no-no-hand"),
         (["run", "--no-governor"], "unrecognized options: --no-governor"),
-        (["bogus"], "hvf COMMAND --help lists the options"),
+        (["run", "--stifness", "3"], "--stifness, 3; perhaps --stiffness is meant; hvf run --help lists the options"),
+        (["bogus"], "no such command: bogus; expected one of demo, run, live, "),
+        (["hardware", "lst"], "no such command: lst; expected one of list, doctor, run, calibrate, identify; hvf hard"),
         (["hardware"], "expected one of {list, doctor, run, "),
         (
             ["convert"],

@@ -44,7 +44,11 @@ CASES = {
     "kinematic": "run --figure kinematic --user push --seconds 2",
     "no-figure": "run --figure none --user push --seconds 2",
     "person": "run --person median --user push --seconds 3",
-    "person-traces": "run --person median --user trace --figure kinematic --seconds 2",
+    "person-changes": "run --mode rivers --map rivers --person median --user change --figure kinematic --seconds 3",
+    **{
+        f"person-{does}": f"run --person median --user {does} --figure kinematic --seconds 2"
+        for does in ("trace", "exaggerate", "cut", "resist", "lost")
+    },
     "own-law": f"{_SCRIPT} own_law.py",
     "compiled-law": f"{_SCRIPT} compiled_law.py",
     "reproduce": f"reproduce {_RUN}",

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 PRINTS = {
     "follow": "largest force",
-    "own_law": "critical k_r",
+    "own_law": "the least of 2 cases of user-defined laws; so is any switching between them",
     "sweep_gains": "k_r = 400 N/m",
     "step_by_step": "half way after",
     "edited_motion": "edited.bvh: 3.0 s",

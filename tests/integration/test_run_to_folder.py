@@ -81,9 +81,12 @@ def test_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: p
 
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize("figure", ["kinematic", "none"])
-def test_run_without_physical_figure_is_reproduced(figure: str, tmp_path: Path) -> None:
+def test_run_without_physical_figure_is_reproduced(
+    figure: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = str(tmp_path / "run")
     assert main(["run", "--figure", figure, "--seconds", "1", "--out", out]) == 0
+    assert ("The clips were played at" in capsys.readouterr().out) == (figure == "kinematic")
     assert main(["reproduce", out]) == 0
 
 

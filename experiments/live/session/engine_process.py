@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from controllers.errors import ControllerError
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE, FAULT_VALUE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY
@@ -35,7 +34,7 @@ from experiments.live.session.workers import PageProcess
 from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
 from geometry.arrays import Array
-from models.errors import ModelError
+from geometry.errors import HvfError
 from sim.compilation.unit_workers import compile_units, missing_units
 from sim.compilation.units import Unit
 from sim.errors import SimError
@@ -138,7 +137,7 @@ class _EngineLoop:
                 return
             try:
                 self._execute(order)
-            except (ModelError, ControllerError, SimError, OSError) as error:
+            except (HvfError, OSError) as error:
                 self._answers.put(Refused(str(error)))
 
     def _execute(self, order: object) -> None:

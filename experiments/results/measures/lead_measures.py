@@ -10,6 +10,7 @@ from controllers.walking.walked_path import PATH_HEADING, path_value
 from controllers.walking.walker import walker_at
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.soles import Soles
+from experiments.results.measures.summary_parts import FigureSummary
 from geometry.arrays import Array, IntArray
 from geometry.quaternions import heading
 from models.humanoid.skeleton import N_POSE
@@ -33,21 +34,22 @@ class LeadSummary:
         Largest turn rates of the path while the figure went along it on no foot, on one foot and on two.
     force_max : float
         Largest force of the field in the horizontal plane [N].
-    slide_cm, physical_slide_cm : float
-        Largest slide of a point of the animation's soles while in contact (`Soles`); the same for the physical
-        figure's soles, which roll, until its first fall.
+    slide_cm : float
+        Largest slide of a point of the animation's soles while in contact (`Soles`).
+    physical_slide_cm : float or None
+        The same for the physical figure's soles, which roll, until its first fall; None without a physical figure.
     retrace_cm, retrace_deg : float or None
         On the way back, largest distance and yaw difference of the animation's root from its outward path; None if it
         never went back.
     physical_retrace_cm, physical_retrace_deg : float or None
-        The same for the physical figure, until its first fall.
+        The same for the physical figure, until its first fall; None without one.
     """
 
     length_m: float
     turn_deg_per_s: tuple[float, float, float]
     force_max: float
     slide_cm: float
-    physical_slide_cm: float
+    physical_slide_cm: float | None
     retrace_cm: float | None
     retrace_deg: float | None
     physical_retrace_cm: float | None
@@ -65,18 +67,22 @@ class LeadSummary:
                     f"{self.physical_retrace_deg:.1f}°"
                 )
             back += "."
+        slid = (
+            ""
+            if self.physical_slide_cm is None
+            else f", the physical figure's by up to {self.physical_slide_cm:.1f} cm"
+        )
         return [
             f"The figure was led {self.length_m:.1f} m, turning by up to {two:.0f}°/s on two feet, {one:.0f}°/s on one "
-            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm, the physical figure's by up "
-            f"to {self.physical_slide_cm:.1f} cm.",
+            f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm{slid}.",
             f"{back} The hand felt up to {self.force_max:.1f} N.",
         ]
 
 
 def lead_summary(
-    recording: Recording, gait: Gait, walkers: Array, scene: SceneConfig, fell_at: float | None
+    recording: Recording, gait: Gait, walkers: Array, scene: SceneConfig, figure: FigureSummary | None
 ) -> LeadSummary:
-    """Measure a run in constant memory, given the figure's gait and the state of its walker at the end of the run."""
+    """Measure a run in constant memory, given its gait, its walker's last state, and measures of a physical figure."""
     ticks, frames = recording.groups["ticks"], recording.groups["frames"]
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
@@ -90,15 +96,16 @@ def lead_summary(
             turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
         force = max(force, _max_norm(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
         soles.add(reference)
-        standing = t < (math.inf if fell_at is None else fell_at)
         shown.add(s, reference, farthest)
-        pressing.add(poses[standing])
-        physical.add(s[standing], poses[standing], farthest)
+        if figure is not None:
+            standing = t < (math.inf if figure.fell_at is None else figure.fell_at)
+            pressing.add(poses[standing])
+            physical.add(s[standing], poses[standing], farthest)
         farthest = max(farthest, float(s.max()))
     none, one, two = (math.degrees(rate) for rate in turns)
     return LeadSummary(
-        farthest, (none, one, two), force, 100.0 * soles.slide, 100.0 * pressing.slide, *shown.result(),
-        *physical.result(),
+        farthest, (none, one, two), force, 100.0 * soles.slide, None if figure is None else 100.0 * pressing.slide,
+        *shown.result(), *physical.result(),
     )  # fmt: skip
 
 

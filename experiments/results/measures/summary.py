@@ -81,7 +81,7 @@ class RunSummary:
             *changed,
             *([held] if self.tank.scaled_ticks else []),
             *self._hand_lines(),
-            *([pace_line] if (pace_line := self.path.line()) else []),
+            *([pace_line] if (pace_line := self.path.line(self.animation is not None)) else []),
             *([] if self.animation is None else [self.animation.soles()]),
             *([] if figure is None else figure.lines()),
             *([] if self.arm is None else self.arm.lines()),

@@ -66,10 +66,14 @@ class PathSummary:
     stopped_at: float | None = None
     pace: float | None = None
 
-    def line(self) -> str | None:
-        """When the stylus stopped and at what pace the clips were played, in words; None if neither applies."""
+    def line(self, played: bool) -> str | None:
+        """When the stylus stopped, and at what pace clips were played if they were; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
-        paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their recorded speed."
+        paced = (
+            ""
+            if self.pace is None or not played
+            else f"The clips were played at {self.pace:.2f} of their recorded speed."
+        )
         return " ".join(part for part in (stopped, paced) if part) or None
 
     @property

@@ -52,9 +52,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
-        lead = lead_summary(
-            of.recording, gait, of.walkers, config.scene, None if summary.figure is None else summary.figure.fell_at
-        )
+        lead = lead_summary(of.recording, gait, of.walkers, config.scene, summary.figure)
         return replace(summary, lead=lead)
 
     return Parts(

@@ -22,6 +22,7 @@ from experiments.setups.parts.part_types import MapParts
 from geometry.arrays import Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, proportion
 from models.mocap.dynamics.contacts import Contacts, contacts
+from models.mocap.library import embedded_names
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import best_lap
@@ -59,7 +60,7 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
     """
     if len(clips) != 1:
         raise ParameterError(f"one clip is led, got {len(clips)}; expected --clips of one, such as walk or run")
-    made, gait = led_map(clips[0], figure)
+    made, gait = led_map(clips[0], figure, is_authored(config))
     return LedParts(
         haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
         refined=lambda: (_begun_in_balance(balanced_on_ground(made, gait, figure), figure), ()),
@@ -88,12 +89,17 @@ def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     return captured, (*remarks_captured, f"{names}: flies when prepared, and is led as captured, by steps")
 
 
-def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
+def is_authored(config: RunConfig) -> bool:
+    """Whether the clip that is led is an embedded one."""
+    return config.map.clips[0] in embedded_names()
+
+
+def led_map(clip: Clip, figure: mujoco.MjModel, authored: bool = True) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
     A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is a clip with flights for which no other form without flights exists. A figure of
-    another stature moves in proportion, with strides of its size.
+    stance feet held (`Capture`); so is a clip with flights that is not authored, or for which no other form without
+    flights exists. A figure of another stature moves in proportion, with strides of its size.
 
     Raises
     ------
@@ -107,7 +113,7 @@ def led_map(clip: Clip, figure: mujoco.MjModel) -> tuple[Led, Gait]:
     if not closes:
         return _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
     made = _map_and_gait(clip, legs, marks.planted[:-1], None)
-    if made[0].flies and not made[0].has_grounded_form:
+    if made[0].flies and not (authored and made[0].has_grounded_form):
         steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
         return steps if steps[0].has_grounded_form else made
     return made

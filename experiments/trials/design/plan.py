@@ -52,7 +52,7 @@ def plan_trials(study: StudyConfig) -> tuple[Trial, ...]:
 
     Raises
     ------
-    ControllerError, SimError, ModelError
+    HvfError
         If the design contradicts itself, a level sets a parameter that a run does not have, or a clip does not exist.
     """
     people = population(study.users.number, study.users.seed)

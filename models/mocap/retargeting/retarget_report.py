@@ -160,7 +160,7 @@ def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
     named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
-        yield f"nothing tells where {', '.join(without)} end: their directions are estimated"
+        yield f"the file does not define the ends of {', '.join(without)}: their directions are estimated"
 
 
 def frame_remarks(

@@ -138,7 +138,7 @@ def test_messages_of_public_interface_name_keywords(
     make: Callable[[], Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((hvf.ControllerError, hvf.ModelError, hvf.SimError)) as error:
+    with pytest.raises(hvf.HvfError) as error:
         make()
     assert message in str(error.value)
     assert "--" not in str(error.value)

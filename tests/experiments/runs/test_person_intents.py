@@ -142,3 +142,4 @@ def test_leading_person_moves_the_figure_along_a_path(tmp_path: Path) -> None:
     assert lead is not None
     assert lead.length_m > 2.0
     assert lead.slide_cm < 3.0  # the bound for every led figure
+    assert "physical" not in " ".join(lead.lines())

@@ -22,6 +22,17 @@ def test_every_name_in_all_exists() -> None:
     assert hvf.__version__
 
 
+def test_errors_of_all_layers_have_one_base(tmp_path: Path) -> None:
+    for kind, refused in (
+        (hvf.ModelError, lambda: hvf.load(tmp_path / "missing.bvh")),
+        (hvf.ControllerError, lambda: hvf.Follow(CURVE, k_r=-1.0, b_d=8)),
+        (hvf.SimError, lambda: hvf.Lifted(tmp_path / "missing.npz")),
+    ):
+        with pytest.raises(hvf.HvfError) as error:
+            refused()
+        assert isinstance(error.value, kind)
+
+
 @pytest.mark.slow
 def test_importing_hvf_loads_no_viewer_or_plots() -> None:
     script = "import sys, hvf; sys.exit(any(name in sys.modules for name in ('viser', 'matplotlib.pyplot')))"

@@ -27,7 +27,9 @@ def test_stylus_at_end_of_open_curve_is_reported_as_stopped(block: int) -> None:
     path = measure.summary()
     assert path.stopped_at == pytest.approx(1.95, abs=0.1)
     assert path.pace == pytest.approx(2.0, rel=0.05)
-    assert "stood still from" in (path.line() or "")
+    assert "stood still from" in (path.line(True) or "")
+    assert "played at" in (path.line(True) or "")
+    assert "played at" not in (path.line(False) or "")
     going = PathMeasure(PathRecording(np.nan))  # pyright: ignore[reportArgumentType]
     going.add({name: values[:1900] for name, values in rows.items()})
-    assert going.summary().line() is None
+    assert going.summary().line(True) is None

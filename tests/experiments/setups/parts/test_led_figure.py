@@ -6,6 +6,8 @@ import pytest
 from scipy.optimize import nnls
 
 from controllers.haptic_map.led import Led
+from experiments.certify.certified_leading import leading_field
+from experiments.config.modes import Lead
 from experiments.config.options import run_config
 from experiments.setups.parts.led_figure import led_parts, stances
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
@@ -86,3 +88,12 @@ def test_refined_run_begins_where_the_figure_can_stand_still() -> None:
     n = len(parts.gait.support)
     before, after = (np.roll(each.gait.support, round(n * each.haptic_map.phase)) for each in (parts, refined))
     np.testing.assert_array_equal(before, after)
+
+
+def test_clip_with_flights_is_led_by_steps_unless_it_is_authored() -> None:
+    configs = [run_config(mode="lead", clips=(name,)) for name in ("run", "run.bvh")]
+    authored, from_file = (led_parts(config, (embedded("run"),), figure_model()) for config in configs)
+    assert authored.haptic_map.flies
+    assert not from_file.haptic_map.flies
+    assert from_file.gait.grounded
+    assert leading_field(configs[1], Lead(), embedded("run")).walking.gait.speed == from_file.gait.speed

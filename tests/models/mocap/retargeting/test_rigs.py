@@ -155,7 +155,7 @@ def _deviation(ours, plain, clip):
     guessed = ours.remarks + plain.remarks
     soles = "soles' orientation is estimated" in guessed
     limbs_without_end = {
-        body for body in BODIES if body.replace("_", " ") in guessed.partition("nothing tells where")[2]
+        body for body in BODIES if body.replace("_", " ") in guessed.partition("does not define the ends of")[2]
     }
     judged = [k for k, body in enumerate(BODIES) if not (soles and body.endswith("foot"))]
     assert ours.segments.shape == plain.segments.shape
@@ -234,7 +234,7 @@ def test_other_lengths_of_arms_and_legs_give_the_same_motion(arm, leg, motions, 
 @pytest.mark.parametrize("tips", [None, 0.0])
 def test_forearm_without_hand_ends_at_its_tip_or_a_guess_is_remarked(tips, motions, compare, tmp_path):
     assert_same_motion(compare(Rig(without=("hand",), tips=tips), motions.clip("walk")))
-    remark = "nothing tells where left forearm, right forearm end: their directions are estimated"
+    remark = "the file does not define the ends of left forearm, right forearm: their directions are estimated"
     assert (remark in load(tmp_path / "r.bvh").report.remarks) == (tips is None)
 
 
