@@ -12,7 +12,7 @@ from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_c
 from controllers.blending.combination import Mixture
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, stored_lap
+from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -188,8 +188,18 @@ class Cylindrical(AnimationMap):
         owner = _ORDINALS[self.legs_of]
         remark = f"the clips are too different to average, so legs and trunk are the {owner} clip's"
         if self.share < 1.0:
-            remark += f", with {100 * self.share:.0f} % of the others' arm motion"
+            remark += f", with {arms_of_others(self.share)}"
         return (remark,)
+
+    @property
+    def lap_durations(self) -> Array:
+        """As in `AnimationMap`; only that of the legs' clip if no other is blended in."""
+        return super().lap_durations if self.share > 0.0 else np.array([self.loops[self.legs_of].duration])
+
+    @property
+    def lap_seconds(self) -> float:
+        """As in `AnimationMap`."""
+        return self.loops[self.legs_of].duration if self.upper else super().lap_seconds
 
     def places(self, angles: Array) -> Array:
         """Upright stylus poses (k, n, 7) at which the weights are those of the mixtures, at angles θ (n,)."""

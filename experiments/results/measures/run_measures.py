@@ -53,8 +53,8 @@ def summarise(
     ----------
     recording : Recording
         Recording with the channels of `sim.loop.channels.groups`, and the arrays ``curve_span`` (first and last phase),
-        ``curve_closed``, ``clip_seconds`` (duration of a lap at the clips' own pace, NaN where a lap plays no clip),
-        ``scene``, ``body_weight`` and ``com_height``.
+        ``curve_closed``, ``clip_seconds`` (duration of a lap at the own pace of the legs' clips, NaN where a lap plays
+        no clip), ``clip_laps`` (the same of each clip that is played), ``scene``, ``body_weight`` and ``com_height``.
     default_poses : callable
         Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
         in order of time.
@@ -140,6 +140,7 @@ class PathMeasure:
         self._left_alone = MeanSquare()
         self._phase: float | None = None
         self._clip_seconds = float(recording.arrays["clip_seconds"])
+        self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
         self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
         self._last_push_time = -math.inf
@@ -210,10 +211,11 @@ class PathMeasure:
         stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING_TIME else None
         moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
         pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
+        paces = () if pace is None else tuple((laps * self._clip_laps / moving).tolist())
         alone, most = (
             (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
         )
-        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace)
+        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace, paces)
 
 
 def _join_pushes(before: PushSummary, after: PushSummary) -> PushSummary:

@@ -54,8 +54,10 @@ class PathSummary:
         Time from which the stylus stood still within a millimetre until the end, if that was a second or more [s], as
         it does at the end of an open curve.
     pace : float or None
-        Pace at which the clips were played while the stylus moved, relative to their own; None if a lap plays no clip,
-        or the field has no curve.
+        Pace at which the clips of the legs were played while the stylus moved, relative to their own; None if a lap
+        plays no clip, or the field has no curve.
+    paces : tuple of float
+        The same of each clip that is played.
     """
 
     deviation_rms_mm: float | None
@@ -65,11 +67,13 @@ class PathSummary:
     pushes: tuple[PushSummary, ...]
     stopped_at: float | None = None
     pace: float | None = None
+    paces: tuple[float, ...] = ()
 
     def line(self) -> str | None:
         """When the stylus stopped and at what pace the clips were played, in words; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
-        paced = "" if self.pace is None else f"The clips were played at {self.pace:.2f} of their recorded speed."
+        ends = dict.fromkeys(f"{pace:.2f}" for pace in sorted(self.paces)[:: max(len(self.paces) - 1, 1)])
+        paced = f"The clips were played at {' to '.join(ends)} of their recorded speed." if ends else ""
         return " ".join(part for part in (stopped, paced) if part) or None
 
     @property

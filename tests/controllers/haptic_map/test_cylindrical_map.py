@@ -92,6 +92,18 @@ def test_share_of_other_joints_scales_their_rotation(share):
             np.testing.assert_allclose(np.cross(part[12:], whole[12:]), 0.0, atol=1e-9)
             assert np.linalg.norm(part[12:]) == pytest.approx(share * np.linalg.norm(whole[12:]), rel=0.15)
     assert (f"{100 * share:.0f} % of the others' arm motion" in some.remarks[0]) == (share < 1.0)
+    assert ("plays alone" in some.remarks[0]) == (share == 0.0)
+
+
+def test_lap_at_own_pace_is_that_of_the_legs_and_others_count_only_if_they_are_blended_in():
+    clips = [(poses, fps / (1 + k)) for k, (poses, fps) in enumerate(CLIPS)]
+    whole, arms = Cylindrical(clips, R, Z), Cylindrical(clips, R, Z, upper=(3,), legs_of=2)
+    durations = [loop.duration for loop in whole.loops]
+    assert len(set(durations)) == len(durations)
+    assert whole.lap_seconds == pytest.approx(np.mean(durations))
+    assert arms.lap_seconds == durations[2]
+    np.testing.assert_allclose(arms.lap_durations, durations)
+    np.testing.assert_allclose(arms.with_share(0.0).lap_durations, durations[2:3])
 
 
 @pytest.mark.parametrize("haptic_map", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "above 1"])

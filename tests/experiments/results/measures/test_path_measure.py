@@ -28,6 +28,14 @@ def test_stylus_at_end_of_open_curve_is_reported_as_stopped(block: int) -> None:
     assert path.stopped_at == pytest.approx(1.95, abs=0.1)
     assert path.pace == pytest.approx(2.0, rel=0.05)
     assert "stood still from" in (path.line() or "")
+    assert "played at 2.0" in (path.line() or "")
+    several = PathRecording(4.0)
+    several.arrays["clip_laps"] = np.array([4.0, 2.0, 6.0])
+    measure = PathMeasure(several)  # pyright: ignore[reportArgumentType]
+    measure.add(rows)
+    assert measure.summary().pace == path.pace
+    assert "The clips were played at 1.0" in (measure.summary().line() or "")
+    assert " to 3.0" in (measure.summary().line() or "")
     going = PathMeasure(PathRecording(np.nan))  # pyright: ignore[reportArgumentType]
     going.add({name: values[:1900] for name, values in rows.items()})
     assert going.summary().line() is None
