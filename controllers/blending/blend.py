@@ -7,6 +7,7 @@ from numba import njit
 
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.combination import (
+    SIGNED,
     ClipsAt,
     Ground,
     Mixture,
@@ -25,6 +26,9 @@ from controllers.work_array import work_array
 from geometry.arrays import Array, IntArray
 
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
+# Cosine of half the angle between two rotations, 168°, from which a joint is blended by `signed_mean`: with unequal
+# weights the other mean swings over to the heavier clip there.
+_MIN_COSINE = 0.1
 
 
 @njit(forceinline=True)
@@ -90,5 +94,23 @@ def packed_blend(loops: list[Loop], samples: int, groups: IntArray, limbs: Seque
     """
     drifts = np.stack([loop.drift for loop in loops])
     channels = with_ends(aligned_channels(loops, samples, limbs), drifts, limbs)
-    rows = control_points(channels, closing_signs(channels, len(groups))).ravel()
+    closing, in_limbs = closing_signs(channels, len(groups)), [joint for limb in limbs for joint in limb.joints]
+    groups = groups + SIGNED * _pass_half_turn(channels, closing, [0, *in_limbs], len(groups))
+    rows = control_points(channels, closing).ravel()
     return np.concatenate([[samples, len(loops)], drifts.ravel(), packed_figure(groups, limbs), rows])
+
+
+def _pass_half_turn(channels: Array, closing: Array, without: Sequence[int], count: int) -> IntArray:
+    """1 for each joint whose rotations in two clips come near half a turn apart, 0 for others and for those left out.
+
+    In place, its quaternions get the signs in which they are nearest to the joint's zero.
+    """
+    passing = np.zeros(count, dtype=np.int64)
+    for joint in sorted({*range(count)}.difference(without)):
+        at = slice(3 + 4 * joint, 7 + 4 * joint)
+        signs = np.where(channels[:, :, at.start].sum(axis=0) < 0.0, -1.0, 1.0)[:, None]
+        unit = signs * channels[:, :, at] / np.linalg.norm(channels[:, :, at], axis=-1, keepdims=True)
+        if np.einsum("nik,njk->nij", unit, unit).min() < _MIN_COSINE and (closing[:, at] > 0.0).all():
+            passing[joint] = 1
+            channels[:, :, at] *= signs
+    return passing

@@ -19,13 +19,14 @@ from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_
 from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_degree
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
-from controllers.motion.mean import mean_derivative, mean_rotation
+from controllers.motion.mean import mean_derivative, mean_rotation, signed_mean, signed_mean_derivative
 from controllers.work_array import work_array
 from geometry.arrays import Array, IntArray
 from geometry.rotations import multiply
 from geometry.vectors import unit_rotation
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
+SIGNED = 2  # added to the group of a joint that is blended by `signed_mean`
 _PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weights
 
 
@@ -66,10 +67,16 @@ def _mean_rotations(
     """Mean rotation of the root and each joint with the weights of its group, and its local angular velocities."""
     unit, spin = work_array((value.shape[0], 4)), work_array((value.shape[0], 3))
     for joint in range(q.shape[0]):
-        group, at = int(figure[_GROUPS + joint]), 3 + 4 * joint
+        signed, group = divmod(int(figure[_GROUPS + joint]), SIGNED)
+        at = 3 + 4 * joint
         for i in range(value.shape[0]):
             x, y, z = unit_rotation(value[i, at : at + 4], slope[i, at : at + 4], 1.0, unit[i])
             spin[i, 0], spin[i, 1], spin[i, 2] = x, y, z
+        if signed:
+            signed_mean(unit, weights[group], q[joint])
+            if tangents:
+                signed_mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
+            continue
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
@@ -273,7 +280,10 @@ def _combine_borrowed(
 
 
 def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:
-    """Parameters of `combine`: the group of weights of the root and each joint (1 + joints,), and the limbs."""
+    """Parameters of `combine`: the group of weights of the root and each joint (1 + joints,), and the limbs.
+
+    `SIGNED` is added to the group of a joint whose quaternions have signs that are continuous round the lap.
+    """
     return np.concatenate([[len(groups), len(limbs)], groups, *(limb.packed() for limb in limbs)])
 
 

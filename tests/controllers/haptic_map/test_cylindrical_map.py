@@ -112,6 +112,27 @@ def test_share_out_of_range_or_without_legs_of_one_clip_raises_parameter_error(h
         haptic_map.with_share(1.1 if haptic_map.upper else 0.5)
 
 
+@pytest.mark.parametrize("upper", [(), (3,)], ids=["all joints", "above 2"])
+def test_joint_whose_rotations_pass_half_a_turn_does_not_flip(upper):
+    clips = []
+    for sign in (1.0, -1.0):
+        poses = swinging(1, 120)
+        angle = sign * np.deg2rad(80.0 + 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 121)))
+        poses[:, 3 + 4 * 3 :] = 0.0
+        poses[:, 3 + 4 * 3], poses[:, 3 + 4 * 3 + 1] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+        clips.append((poses, 30.0))
+    haptic_map, places = Cylindrical([*clips, *clips], R, Z, upper=upper), np.linspace(0.0, 2.0 * np.pi, 721)[:-1]
+    for r in (0.5 * sum(R), 0.5 * sum(R) + 1e-4):
+        joint = matrices(np.array([haptic_map.pose(stylus(r, angle, 0.0))[-4:] for angle in places]))
+        steps = np.arccos(np.clip(0.5 * (np.einsum("nij,nij->n", joint, np.roll(joint, 1, axis=0)) - 1.0), -1.0, 1.0))
+        assert steps.max() < np.deg2rad(2.0)
+    pose = stylus(0.5 * sum(R) + 2e-3, 1.0, 0.0)
+    np.testing.assert_allclose(haptic_map.jacobian(pose)[:, :3], numeric_jacobian(haptic_map, pose, 1e-5), atol=1e-4)
+    for corner, clip in enumerate(clips):
+        pose = haptic_map.pose(stylus(*_at(corner, 0.25)))
+        assert abs(pose[-4:] @ haptic_map.loops[corner].channels(np.array([0.25]), np.zeros(1))[0, -4:]) > 0.99
+
+
 def test_pose_beyond_the_edges_equals_that_at_the_edge():
     for k, (r, z) in enumerate([(0.005, -0.2), (0.3, -0.1), (0.02, 0.2), (0.2, 0.31)]):
         np.testing.assert_array_equal(STILL.pose(stylus(r, 1.0, z)), STILL.pose(stylus(*_at(k, 1.0 / (2 * np.pi)))))
