@@ -204,9 +204,7 @@ def signed_mean(unit: Array, weights: Array, q: Quat) -> None:
 
 
 @njit
-def signed_mean_derivative(
-    unit: Array, spin: Array, weights: Array, changes: Array, q: Quat, tangent: Array
-) -> None:
+def signed_mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q: Quat, tangent: Array) -> None:
     """Local angular velocities of `signed_mean`; the arguments are those of `mean_derivative`.
 
     From q |Σ w_i q_i| = Σ w_i q_i: ω Σ w_i s_i = Σ 2 dw_i v_i + w_i (s_i ω_i + v_i × ω_i).

@@ -128,7 +128,7 @@ def test_joint_whose_rotations_pass_half_a_turn_does_not_flip(upper):
         assert steps.max() < np.deg2rad(2.0)
     pose = stylus(0.5 * sum(R) + 2e-3, 1.0, 0.0)
     np.testing.assert_allclose(haptic_map.jacobian(pose)[:, :3], numeric_jacobian(haptic_map, pose, 1e-5), atol=1e-4)
-    for corner, clip in enumerate(clips):
+    for corner in range(2):
         pose = haptic_map.pose(stylus(*_at(corner, 0.25)))
         assert abs(pose[-4:] @ haptic_map.loops[corner].channels(np.array([0.25]), np.zeros(1))[0, -4:]) > 0.99
 
