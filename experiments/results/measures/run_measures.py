@@ -233,12 +233,19 @@ class AnimationMeasure:
     def __init__(self, recording: Recording, since: float) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
         self._stride, self._next_row = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
-        self._pushed, self._unpushed = 0.0, 0.0
+        self._pushed, self._unpushed, self._fastest = 0.0, 0.0, 0.0
+        self._rate: float = recording.rates["frames"]
+        self._last_pose: Array | None = None
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: Mask) -> None:
         """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
         self._soles.add(frames["reference"][self._next_row :: self._stride])
         self._next_row = (self._next_row - len(default)) % self._stride
+        poses = frames["reference"]
+        before = np.vstack((poses[:1] if self._last_pose is None else self._last_pose, poses[:-1]))
+        steps = pose_difference(poses, before)[:, 6:].reshape(len(poses), -1, 3)
+        self._fastest = max(self._fastest, self._rate * float(np.max(np.linalg.norm(steps, axis=2), initial=0.0)))
+        self._last_pose = poses[-1:].copy()
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING_TIME
@@ -249,5 +256,5 @@ class AnimationMeasure:
         """What was taken so far."""
         lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
         return AnimationSummary(
-            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide
+            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide, self._fastest
         )

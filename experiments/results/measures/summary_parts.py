@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sim.body.residual import Residual
 
 _MAX_LISTED_FALLS = 5  # falls that are listed one by one
+_MAX_JOINT_SPEED = 140.0  # [rad/s] the fastest, the shoulder of a pitcher, turns at some 130
 _MIN_REPORTED_TIME = 0.01  # [s] without ground force from which its residual is reported
 
 
@@ -96,17 +97,23 @@ class AnimationSummary:
         Least height of a point of the soles above the floor.
     foot_skate_cm : float
         Largest slide of a point of the soles while it is within 3 mm of the floor (`models.mocap.motion.foot_skate`).
+    fastest_joint : float
+        Largest angular velocity of a joint [rad/s].
     """
 
     pushed_deg: float
     unpushed_deg: float
     lowest_sole_cm: float = 0.0
     foot_skate_cm: float = 0.0
+    fastest_joint: float = 0.0
 
     def soles(self) -> str:
-        """Height and slide of the soles, in a sentence."""
+        """Height and slide of the soles, and a joint that is faster than any of a human body, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        return f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most."
+        flips = f", and a joint jumps ({self.fastest_joint:.0f} rad/s)" if self.fastest_joint > _MAX_JOINT_SPEED else ""
+        return (
+            f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most{flips}."
+        )
 
 
 @dataclass(frozen=True)
