@@ -26,9 +26,9 @@ from controllers.work_array import work_array
 from geometry.arrays import Array, IntArray
 
 _SAMPLES, _CLIPS, _DRIFTS = range(3)
-# Cosine of half the angle between two rotations, 168°, from which a joint is blended by `signed_mean`: with unequal
-# weights the other mean swings over to the heavier clip there.
-_MIN_COSINE = 0.1
+# Cosines of half the angle between two rotations of a joint, between which it is blended by `signed_mean`: from 168° on
+# the other mean swings over to the heavier clip; beyond 277°, of joints that go round, this one is three times as fast.
+_MAX_COSINE, _MIN_COSINE = 0.1, -0.75
 
 
 @njit(forceinline=True)
@@ -110,7 +110,8 @@ def _pass_half_turn(channels: Array, closing: Array, without: Sequence[int], cou
         at = slice(3 + 4 * joint, 7 + 4 * joint)
         signs = np.where(channels[:, :, at.start].sum(axis=0) < 0.0, -1.0, 1.0)[:, None]
         unit = signs * channels[:, :, at] / np.linalg.norm(channels[:, :, at], axis=-1, keepdims=True)
-        if np.einsum("nik,njk->nij", unit, unit).min() < _MIN_COSINE and (closing[:, at] > 0.0).all():
+        cosine = float(np.einsum("nik,njk->nij", unit, unit).min())
+        if _MIN_COSINE < cosine < _MAX_COSINE and (closing[:, at] > 0.0).all():
             passing[joint] = 1
             channels[:, :, at] *= signs
     return passing

@@ -110,10 +110,9 @@ class AnimationSummary:
     def soles(self) -> str:
         """Height and slide of the soles, and a joint that is faster than any of a human body, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        flips = f", and a joint jumps ({self.fastest_joint:.0f} rad/s)" if self.fastest_joint > _MAX_JOINT_SPEED else ""
-        return (
-            f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most{flips}."
-        )
+        jump = f", and a joint jumps ({self.fastest_joint:.0f} rad/s)" if self.fastest_joint > _MAX_JOINT_SPEED else ""
+        slide = f"soles slide {self.foot_skate_cm:.1f} cm at most"
+        return f"The animation's lowest sole is at {lowest:+.1f} cm; {slide}{jump}."
 
 
 @dataclass(frozen=True)
