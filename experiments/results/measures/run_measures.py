@@ -36,6 +36,7 @@ SETTLING_TIME = 1.0  # [s] after the start or after a push, until a relaxed hand
 MIN_PUSH_FORCE = 1e-3  # [N] force above which the hand counts as pushing
 STANDSTILL_RADIUS = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
+_PACE_TIME = 0.1  # [s] over which the hand's pace is averaged
 _TICK_CHANNELS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 
@@ -142,6 +143,8 @@ class PathMeasure:
         self._clip_seconds = float(recording.arrays["clip_seconds"])
         self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
         self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
+        self._pace_ticks, self._ticks = max(1, round(_PACE_TIME * recording.rates["ticks"])), 0
+        self._travelled: list[float] = []  # phase travelled, every `_PACE_TIME`
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
         self._last_push_time = -math.inf
         self._replayed = "replayed" in recording.texts
@@ -181,7 +184,10 @@ class PathMeasure:
         steps = np.diff(phase, prepend=self._phase)
         if self._closed:
             steps -= self._span * np.round(steps / self._span)
-        self._phase_travelled += float(np.sum(steps))
+        travelled = self._phase_travelled + np.cumsum(steps)
+        self._travelled += travelled[-self._ticks % self._pace_ticks :: self._pace_ticks].tolist()
+        self._ticks += len(steps)
+        self._phase_travelled = float(travelled[-1])
         self._phase, self._last_time = float(phase[-1]), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
@@ -215,7 +221,12 @@ class PathMeasure:
         alone, most = (
             (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
         )
-        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace, paces)
+        settled = np.diff(self._travelled)[round(SETTLING_TIME / _PACE_TIME) :]
+        spread = None
+        if pace is not None and stopped is None and len(settled) and settled.mean() > 0.0:
+            low, high = np.quantile(settled / settled.mean(), (0.05, 0.95))
+            spread = (float(low), float(high)) if low > 0.0 else None
+        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace, paces, spread)
 
 
 def _join_pushes(before: PushSummary, after: PushSummary) -> PushSummary:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sim.body.residual import Residual
 
 _MAX_LISTED_FALLS = 5  # falls that are listed one by one
+_EVEN_PACE = 0.85, 1.2  # interval of the hand's pace over its mean: the default push keeps it within 0.87 and 1.18
 _MAX_JOINT_SPEED = 140.0  # [rad/s] the fastest, the shoulder of a pitcher, turns at some 130
 _MIN_REPORTED_TIME = 0.01  # [s] without ground force from which its residual is reported
 
@@ -59,6 +60,9 @@ class PathSummary:
         plays no clip, or the field has no curve.
     paces : tuple of float
         The same of each clip that is played.
+    pace_spread : tuple of float, optional
+        Paces of the hand over its mean pace that it fell below, and exceeded, for a twentieth of the time each, after
+        the first second; None as `pace`, and of a hand that stops or goes back, such as one that bends a curve.
     """
 
     deviation_rms_mm: float | None
@@ -69,12 +73,19 @@ class PathSummary:
     stopped_at: float | None = None
     pace: float | None = None
     paces: tuple[float, ...] = ()
+    pace_spread: tuple[float, float] | None = None
 
     def line(self) -> str | None:
         """When the stylus stopped and at what pace the clips were played, in words; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
         ends = dict.fromkeys(f"{pace:.2f}" for pace in sorted(self.paces)[:: max(len(self.paces) - 1, 1)])
-        paced = f"The clips were played at {' to '.join(ends)} of their recorded speed." if ends else ""
+        low, high = self.pace_spread or (1.0, 1.0)
+        uneven = (
+            f"; the hand was below {low:.2f} and above {high:.2f} of its mean pace for a twentieth of the time each"
+            if low < _EVEN_PACE[0] or high > _EVEN_PACE[1]
+            else ""
+        )
+        paced = f"The clips were played at {' to '.join(ends)} of their recorded speed{uneven}." if ends else ""
         return " ".join(part for part in (stopped, paced) if part) or None
 
     @property
