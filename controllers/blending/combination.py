@@ -16,7 +16,7 @@ from numba import njit
 from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
-from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_degree
+from controllers.legs.stance_hold import advance_hand, hold_stance_foot
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation, signed_mean, signed_mean_derivative
@@ -167,6 +167,8 @@ class Ground(NamedTuple):
     ----------
     footing : Array
         Memory of the ends' footing (see `stance_hold`); updated. If empty, ends are not held.
+    mixing : float
+        μ of the clips that move the ends (`mixing_degree`).
     soles : Array, shape (limbs, k, 3)
         Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
     contact, floor : float
@@ -174,6 +176,7 @@ class Ground(NamedTuple):
     """
 
     footing: Array
+    mixing: float
     soles: Array
     contact: float
     floor: float
@@ -216,7 +219,7 @@ def _combine_borrowed(
 ) -> None:  # fmt: skip
     value, slope, drifts = clips
     weights, changes, chain, correction = mixture
-    footing, soles, contact, floor = ground
+    footing, mixing, soles, contact, floor = ground
     rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
@@ -229,13 +232,13 @@ def _combine_borrowed(
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead, mixing = work_array(3), 0.0, 0.0
+    frame, ahead = work_array(3), 0.0
     if footing.shape[0] > 0:
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
         frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
         frame[2] = s * drift[0, 2] + lap
-        ahead, mixing = advance_hand(footing, angle), mixing_degree(weights[0])
+        ahead = advance_hand(footing, angle)
 
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)

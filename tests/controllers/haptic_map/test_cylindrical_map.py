@@ -194,7 +194,7 @@ def test_lap_there_and_back_returns_to_the_same_pose():
     path = np.concatenate([np.linspace(0.1, 15.0, 400), np.linspace(15.0, 0.1, 400)])
     poses = [MOVING.pose(stylus(0.045, angle, 0.012), memory) for angle in path]
     assert np.linalg.norm(np.subtract(poses[399], poses[0])[:2]) > 0.05
-    np.testing.assert_allclose(difference(poses[-1], poses[0]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(difference(poses[-1], poses[0]), 0.0, atol=1e-8)  # places of held feet are sums of steps
     assert memory[LAPS] == 0.0
 
 
