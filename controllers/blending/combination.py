@@ -16,16 +16,17 @@ from numba import njit
 from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
-from controllers.legs.stance_hold import advance_hand, hold_stance_foot, mixing_degree
+from controllers.legs.stance_hold import advance_hand, hold_stance_foot
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
-from controllers.motion.mean import mean_derivative, mean_rotation
+from controllers.motion.mean import mean_derivative, mean_rotation, signed_mean, signed_mean_derivative
 from controllers.work_array import work_array
 from geometry.arrays import Array, IntArray
 from geometry.rotations import multiply
 from geometry.vectors import unit_rotation
 
 _ROTATIONS, _LIMBS, _GROUPS = range(3)
+SIGNED = 2  # added to the group of a joint that is blended by `signed_mean`
 _PARAMETERS = 3  # parameters of a pose: θ, and two that change only the weights
 
 
@@ -66,10 +67,16 @@ def _mean_rotations(
     """Mean rotation of the root and each joint with the weights of its group, and its local angular velocities."""
     unit, spin = work_array((value.shape[0], 4)), work_array((value.shape[0], 3))
     for joint in range(q.shape[0]):
-        group, at = int(figure[_GROUPS + joint]), 3 + 4 * joint
+        signed, group = divmod(int(figure[_GROUPS + joint]), SIGNED)
+        at = 3 + 4 * joint
         for i in range(value.shape[0]):
             x, y, z = unit_rotation(value[i, at : at + 4], slope[i, at : at + 4], 1.0, unit[i])
             spin[i, 0], spin[i, 1], spin[i, 2] = x, y, z
+        if signed:
+            signed_mean(unit, weights[group], q[joint])
+            if tangents:
+                signed_mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
+            continue
         mean_rotation(unit, weights[group], q[joint])
         if tangents:
             mean_derivative(unit, spin, weights[group], changes[group], q[joint], rates[joint])
@@ -160,6 +167,8 @@ class Ground(NamedTuple):
     ----------
     footing : Array
         Memory of the ends' footing (see `stance_hold`); updated. If empty, ends are not held.
+    mixing : float
+        μ of the clips that move the ends (`mixing_degree`).
     soles : Array, shape (limbs, k, 3)
         Sole points of each end, from their centre [m]. If empty, ends are not kept above the floor.
     contact, floor : float
@@ -167,6 +176,7 @@ class Ground(NamedTuple):
     """
 
     footing: Array
+    mixing: float
     soles: Array
     contact: float
     floor: float
@@ -209,7 +219,7 @@ def _combine_borrowed(
 ) -> None:  # fmt: skip
     value, slope, drifts = clips
     weights, changes, chain, correction = mixture
-    footing, soles, contact, floor = ground
+    footing, mixing, soles, contact, floor = ground
     rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
     corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
@@ -222,13 +232,13 @@ def _combine_borrowed(
     update_lap(memory, angle, drift[0])
     # Root and ends are given in the frame of the drift, and that in the frame of the lap.
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead, mixing = work_array(3), 0.0, 0.0
+    frame, ahead = work_array(3), 0.0
     if footing.shape[0] > 0:
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
         frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
         frame[2] = s * drift[0, 2] + lap
-        ahead, mixing = advance_hand(footing, angle), mixing_degree(weights[0])
+        ahead = advance_hand(footing, angle)
 
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
@@ -273,7 +283,10 @@ def _combine_borrowed(
 
 
 def packed_figure(groups: IntArray, limbs: Sequence[Limb]) -> Array:
-    """Parameters of `combine`: the group of weights of the root and each joint (1 + joints,), and the limbs."""
+    """Parameters of `combine`: the group of weights of the root and each joint (1 + joints,), and the limbs.
+
+    `SIGNED` is added to the group of a joint whose quaternions have signs that are continuous round the lap.
+    """
     return np.concatenate([[len(groups), len(limbs)], groups, *(limb.packed() for limb in limbs)])
 
 

@@ -104,7 +104,6 @@ class AnimationMap(ClipMap):
         frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in self.loops)
         samples = int(np.clip(np.ceil(frames), 64, 2048))
         params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
-        self._lap_seconds = float(np.mean([loop.duration for loop in self.loops]))
         super().__init__(params, clips, [str(i) for i in range(len(clips))], limbs)
 
     @property
@@ -113,13 +112,24 @@ class AnimationMap(ClipMap):
         return 1
 
     @property
+    def lap_durations(self) -> Array:
+        """Durations of a lap at which each clip that is played, with its repeats, runs at its own pace [s]."""
+        return np.array([loop.duration for loop in self.loops]) / self.laps
+
+    @property
     def lap_seconds(self) -> float:
-        """Duration of a lap at which the clips, with their repeats, run on average at their own pace [s]."""
-        return self._lap_seconds / self.laps
+        """Duration of a lap at which the clips of the legs run on average at their own pace [s]."""
+        return float(np.mean(self.lap_durations))
 
     def lap_array(self) -> dict[str, Array]:
         """The lap that the map was made for, as an array by key; empty without one."""
         return {} if self.lap is None else {"lap": np.array([self.lap])}
+
+
+def arms_of_others(share: float) -> str:
+    """In words, at the end of a remark, which share of the others' arm motion is combined with one clip's legs."""
+    alone = "" if share > 0.0 else ": one clip plays alone, and the hand changes nothing but its pace"
+    return "the others' arm motion" if share == 1.0 else f"{100 * share:.0f} % of the others' arm motion{alone}"
 
 
 def stored_lap(arrays: Mapping[str, Array]) -> float | None:

@@ -10,7 +10,7 @@ from controllers.blending.blend import blend
 from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, stored_lap
+from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
 from controllers.legs.limbs import Limb
 from controllers.work_array import work_array
 from geometry.arrays import Array
@@ -90,7 +90,17 @@ class Composite(AnimationMap):
         """A remark if only a share of red and blue is blended in."""
         if self.share == 1.0:
             return ()
-        return (f"the lower body is combined with {100 * self.share:.0f} % of the others' arm motion",)
+        return (f"the lower body is combined with {arms_of_others(self.share)}",)
+
+    @property
+    def lap_durations(self) -> Array:
+        """As in `AnimationMap`; only that of the lower clip if no other is blended in."""
+        return super().lap_durations[: None if self.share > 0.0 else 1]
+
+    @property
+    def lap_seconds(self) -> float:
+        """As in `AnimationMap`."""
+        return self.loops[0].duration
 
     def with_share(self, share: float) -> "Composite":
         """The same map with another share λ of red and blue: 0 leaves the upper body to the lower clip.

@@ -12,10 +12,12 @@ from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_c
 from controllers.blending.combination import Mixture
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, stored_lap
+from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
+from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
+from controllers.legs.stance_hold import fresh_footing
 from controllers.motion.inbetween import FOOT, ROOT, correction, packed_table, table_channels
 from controllers.work_array import work_array
 from geometry.arrays import Array
@@ -87,7 +89,8 @@ class Cylindrical(AnimationMap):
     θ = atan2(y, x) is the phase: one lap of the hand is one lap of every clip. The weights w_i(r, z) blend the four
     clips bilinearly with eased edges (C²) and are constant beyond them, so no limb is ever extrapolated. `blending`
     describes how poses are blended. With limbs, in-betweens are corrected by a table (`inbetween`): feet move one at a
-    time while they are lifted (`footfalls`), and the root may sway (`with_sway`).
+    time while they are lifted (`footfalls`), and the root may sway (`with_sway`). While the hand changes the mixture,
+    feet in stance keep their places (`stance_hold`).
 
     The mean of clips with different footsteps is not a gait: while one clip plants a foot, another lifts it. With
     `upper`, only those joints are blended; root, legs and feet are those of one clip everywhere. Where that clip's legs
@@ -96,8 +99,9 @@ class Cylindrical(AnimationMap):
 
     A ∈ SE(2) is the frame of the lap, stored in the memory: it moves by exp(Σ w_i ξ_i) each time the hand passes the
     seam θ = 0 forwards, and by the inverse backwards, so the figure walks on. Pose, velocity and acceleration are
-    continuous over the seam. If no clip travels or turns, A stays the identity and h is a function of the stylus
-    position alone. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence h, is not defined.
+    continuous over the seam. If no clip travels or turns, A stays the identity, and h is a function of the stylus
+    position alone if no foot is held. h does not depend on the stylus orientation. On the axis r = 0 the phase, hence
+    h, is not defined.
 
     Parameters
     ----------
@@ -167,6 +171,13 @@ class Cylindrical(AnimationMap):
         if limbs:
             self._set_corrections(self._compute_corrections(limbs) if corrections is None else corrections)
 
+    def compiled(self) -> CompiledMap:
+        """As in `ClipMap`; where legs are blended, the memory has a footing."""
+        compiled = super().compiled()
+        if self.upper or not self.limbs:
+            return compiled
+        return compiled._replace(memory=np.concatenate([compiled.memory, fresh_footing(len(self.limbs))]))
+
     def _compute_corrections(self, limbs: Sequence[Limb]) -> Array:
         if self.upper:
             return np.zeros((_MAX_ROWS, *correction_shape(len(limbs))))
@@ -188,8 +199,18 @@ class Cylindrical(AnimationMap):
         owner = _ORDINALS[self.legs_of]
         remark = f"the clips are too different to average, so legs and trunk are the {owner} clip's"
         if self.share < 1.0:
-            remark += f", with {100 * self.share:.0f} % of the others' arm motion"
+            remark += f", with {arms_of_others(self.share)}"
         return (remark,)
+
+    @property
+    def lap_durations(self) -> Array:
+        """As in `AnimationMap`; only that of the legs' clip if no other is blended in."""
+        return super().lap_durations if self.share > 0.0 else np.array([self.loops[self.legs_of].duration])
+
+    @property
+    def lap_seconds(self) -> float:
+        """As in `AnimationMap`."""
+        return self.loops[self.legs_of].duration if self.upper else super().lap_seconds
 
     def places(self, angles: Array) -> Array:
         """Upright stylus poses (k, n, 7) at which the weights are those of the mixtures, at angles θ (n,)."""

@@ -10,7 +10,7 @@ from controllers.blending.combination import fresh_lap
 from controllers.curves.splines import periodic_interpolation
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.animation import ClipMap, arms_of_others
 from controllers.haptic_map.lifted_kernel import clip_weights, lifted_map, packed_lifted, with_legs_of
 from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
@@ -166,9 +166,8 @@ class Lifted(ClipMap):
         """A remark if only some joints are blended."""
         if self.legs_of is None:
             return ()
-        owner, arms = self.names[self.legs_of], "the others' arm motion"
-        what = arms if self.share == 1.0 else f"{100 * self.share:.0f} % of {arms}"
-        return (f"legs and trunk are those of {owner} wherever the hand is pushed, with {what}",)
+        owner, arms = self.names[self.legs_of], arms_of_others(self.share)
+        return (f"legs and trunk are those of {owner} wherever the hand is pushed, with {arms}",)
 
     def with_legs_of(self, clip: int, upper: Sequence[int], share: float) -> "Lifted":
         """The same map with root and all joints but `upper` (counted from 1) from one clip, and a share λ of the rest.

@@ -25,7 +25,7 @@ from controllers.haptic_map.lifting.sites import box
 from controllers.legs.floor import SOFTNESS
 from controllers.legs.limb_ends import end_channels, end_lag, end_poses, grounds, lowest_of_limbs
 from controllers.legs.limbs import N_END_CHANNELS, Limb
-from controllers.legs.stance_hold import packed_soles
+from controllers.legs.stance_hold import mixing_degree, packed_soles
 from controllers.motion.channels import normalise
 from controllers.motion.lap import MEMORY
 from controllers.saturation import soft_clamp
@@ -131,7 +131,7 @@ def lifted_map(params: Array, x: Array, memory: Array, pose: Array, jacobian: Ar
         contact += w[0, i] * params[at + 1 + near[i]]
     soles = params[at + 1 + total :].reshape(limbs, -1, 3) if limbs > 0 else work_array((0, 0, 3))
     mixture = Mixture(w[:, :count], changes[:, :, :count], chain, d)
-    ground = Ground(memory[MEMORY:], soles, contact, params[at])
+    ground = Ground(memory[MEMORY:], mixing_degree(w[0, :count]), soles, contact, params[at])
     combine(figure, ClipsAt(value, slope, drifts), angle, mixture, memory[:MEMORY], ground, pose, jacobian)
 
 

@@ -33,6 +33,7 @@ from controllers.haptic_map.river_memory import (
     timing_curve,
 )
 from controllers.legs.limbs import Limb
+from controllers.motion.lap import MEMORY
 from controllers.state import Pose
 from controllers.work_array import work_array
 from geometry.arrays import Array
@@ -73,7 +74,7 @@ def river_clips_map(params: Array, x: Array, memory: Array, pose: Pose, jacobian
     weights[:], changes[:] = 0.0, 0.0
     weights[0, river] = 1.0
     angle = pace * (shown - start)
-    blend(params[int(params[BLEND]) :], angle, weights, changes, chain, memory, pose, jacobian)
+    blend(params[int(params[BLEND]) :], angle, weights, changes, chain, memory[:MEMORY], pose, jacobian)
     if change >= 0:
         for i in range(6):
             chain[0, i] /= pace

@@ -10,6 +10,11 @@ walk.
 With r_i = q⁻¹ ⊗ q_i = (s_i, v_i), the mean satisfies g = Σ w_i s_i v_i = 0 and A = Σ w_i (s_i² I − v_i v_iᵀ), which
 is λI − M in the tangent space of q, is positive definite: that proves that the iteration found the largest eigenvalue.
 All of this also holds if some weights are negative: M need not be definite.
+
+The single point is met, however, where a hand stays on a curve on which two clips have equal weights: as their
+rotations pass half a turn, the mean flips by half a turn from one moment to the next. Joints of which that is true are
+blended by the normalised sum of their quaternions with signs that are continuous round the lap (`signed_mean`): the
+mean of an arm 100° ahead and one 100° behind hangs down, and does not change over to the other side at 90°.
 """
 
 import numpy as np
@@ -184,3 +189,40 @@ def mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q:
     for k in range(tangent.shape[1]):
         x, y, z = _solve(e, 2.0 * tangent[0, k], 2.0 * tangent[1, k], 2.0 * tangent[2, k])
         tangent[0, k], tangent[1, k], tangent[2, k] = x, y, z
+
+
+@njit
+def signed_mean(unit: Array, weights: Array, q: Quat) -> None:
+    """Normalised sum of weighted quaternions whose signs matter; the arguments are those of `mean_rotation`."""
+    q[:] = 0.0
+    for i in range(unit.shape[0]):
+        for j in range(4):
+            q[j] += weights[i] * unit[i, j]
+    norm = max(np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2), 1e-12)
+    for j in range(4):
+        q[j] /= norm
+
+
+@njit
+def signed_mean_derivative(unit: Array, spin: Array, weights: Array, changes: Array, q: Quat, tangent: Array) -> None:
+    """Local angular velocities of `signed_mean`; the arguments are those of `mean_derivative`.
+
+    From q |Σ w_i q_i| = Σ w_i q_i: ω Σ w_i s_i = Σ 2 dw_i v_i + w_i (s_i ω_i + v_i × ω_i).
+    """
+    tangent[:] = 0.0
+    norm = 0.0
+    for i in range(unit.shape[0]):
+        s, x, y, z = relative(q[0], q[1], q[2], q[3], unit[i, 0], unit[i, 1], unit[i, 2], unit[i, 3])
+        a, b, c = spin[i, 0], spin[i, 1], spin[i, 2]
+        norm += weights[i] * s
+        tangent[0, 0] += weights[i] * (s * a + y * c - z * b)
+        tangent[1, 0] += weights[i] * (s * b + z * a - x * c)
+        tangent[2, 0] += weights[i] * (s * c + x * b - y * a)
+        for k in range(changes.shape[0]):
+            tangent[0, k] += 2.0 * changes[k, i] * x
+            tangent[1, k] += 2.0 * changes[k, i] * y
+            tangent[2, k] += 2.0 * changes[k, i] * z
+    norm = max(norm, 1e-12)
+    for k in range(tangent.shape[1]):
+        for j in range(3):
+            tangent[j, k] /= norm

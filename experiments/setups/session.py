@@ -1,6 +1,5 @@
 """A wired run: its parts, the constant data that its recording keeps, and the animation of its unedited curve."""
 
-import math
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -111,7 +110,8 @@ class Session:
             "p_WH": P_WH,
             "motor_continuous": np.array(PREMIUM_1_5.continuous_torque),
             "motor_peak": np.array(PREMIUM_1_5.peak_torque),
-            "clip_seconds": math.nan if self.parts.maps.lap_seconds is None else self.parts.maps.lap_seconds,
+            "clip_seconds": self.parts.maps.lap_seconds,
+            "clip_laps": self.parts.maps.lap_durations,
             "body_weight": self.weight,
             "com_height": standing_com(scene.stature, scene.mass),
             "scene": np.array([scene.stature, scene.mass, scene.servo_period, scene.physics_step]),

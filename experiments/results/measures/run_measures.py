@@ -36,6 +36,7 @@ SETTLING_TIME = 1.0  # [s] after the start or after a push, until a relaxed hand
 MIN_PUSH_FORCE = 1e-3  # [N] force above which the hand counts as pushing
 STANDSTILL_RADIUS = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
+_PACE_TIME = 0.1  # [s] over which the hand's pace is averaged
 _TICK_CHANNELS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
 
@@ -53,8 +54,8 @@ def summarise(
     ----------
     recording : Recording
         Recording with the channels of `sim.loop.channels.groups`, and the arrays ``curve_span`` (first and last phase),
-        ``curve_closed``, ``clip_seconds`` (duration of a lap at the clips' own pace, NaN where a lap plays no clip),
-        ``scene``, ``body_weight`` and ``com_height``.
+        ``curve_closed``, ``clip_seconds`` (duration of a lap at the own pace of the legs' clips, NaN where a lap plays
+        no clip), ``clip_laps`` (the same of each clip that is played), ``scene``, ``body_weight`` and ``com_height``.
     default_poses : callable
         Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
         in order of time.
@@ -140,7 +141,10 @@ class PathMeasure:
         self._left_alone = MeanSquare()
         self._phase: float | None = None
         self._clip_seconds = float(recording.arrays["clip_seconds"])
+        self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
         self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
+        self._pace_ticks, self._ticks = max(1, round(_PACE_TIME * recording.rates["ticks"])), 0
+        self._travelled: list[float] = []  # phase travelled, every `_PACE_TIME`
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
         self._last_push_time = -math.inf
         self._replayed = "replayed" in recording.texts
@@ -180,7 +184,10 @@ class PathMeasure:
         steps = np.diff(phase, prepend=self._phase)
         if self._closed:
             steps -= self._span * np.round(steps / self._span)
-        self._phase_travelled += float(np.sum(steps))
+        travelled = self._phase_travelled + np.cumsum(steps)
+        self._travelled += travelled[-self._ticks % self._pace_ticks :: self._pace_ticks].tolist()
+        self._ticks += len(steps)
+        self._phase_travelled = float(travelled[-1])
         self._phase, self._last_time = float(phase[-1]), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
@@ -210,10 +217,16 @@ class PathMeasure:
         stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING_TIME else None
         moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
         pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
+        paces = () if pace is None else tuple((laps * self._clip_laps / moving).tolist())
         alone, most = (
             (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
         )
-        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace)
+        settled = np.diff(self._travelled)[round(SETTLING_TIME / _PACE_TIME) :]
+        spread = None
+        if pace is not None and stopped is None and len(settled) and settled.mean() > 0.0:
+            low, high = np.quantile(settled / settled.mean(), (0.05, 0.95))
+            spread = (float(low), float(high)) if low > 0.0 else None
+        return PathSummary(alone, most, laps, lap_seconds, tuple(self._pushes), stopped, pace, paces, spread)
 
 
 def _join_pushes(before: PushSummary, after: PushSummary) -> PushSummary:
@@ -231,12 +244,19 @@ class AnimationMeasure:
     def __init__(self, recording: Recording, since: float) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
         self._stride, self._next_row = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
-        self._pushed, self._unpushed = 0.0, 0.0
+        self._pushed, self._unpushed, self._fastest = 0.0, 0.0, 0.0
+        self._rate: float = recording.rates["frames"]
+        self._last_pose: Array | None = None
 
     def add(self, frames: Mapping[str, Array], default: Array, pushed: Mask) -> None:
         """Add a block of frames, the poses of the map on the curve at these frames, and whether the hand pushes."""
         self._soles.add(frames["reference"][self._next_row :: self._stride])
         self._next_row = (self._next_row - len(default)) % self._stride
+        poses = frames["reference"]
+        before = np.vstack((poses[:1] if self._last_pose is None else self._last_pose, poses[:-1]))
+        steps = pose_difference(poses, before)[:, 6:].reshape(len(poses), -1, 3)
+        self._fastest = max(self._fastest, self._rate * float(np.max(np.linalg.norm(steps, axis=2), initial=0.0)))
+        self._last_pose = poses[-1:].copy()
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING_TIME
@@ -247,5 +267,5 @@ class AnimationMeasure:
         """What was taken so far."""
         lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
         return AnimationSummary(
-            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide
+            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide, self._fastest
         )

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from sim.body.residual import Residual
 
 _MAX_LISTED_FALLS = 5  # falls that are listed one by one
+_EVEN_PACE = 0.85, 1.2  # interval of the hand's pace over its mean: the default push keeps it within 0.87 and 1.18
+_MAX_JOINT_SPEED = 140.0  # [rad/s] the fastest, the shoulder of a pitcher, turns at some 130
 _MIN_REPORTED_TIME = 0.01  # [s] without ground force from which its residual is reported
 
 
@@ -54,8 +56,13 @@ class PathSummary:
         Time from which the stylus stood still within a millimetre until the end, if that was a second or more [s], as
         it does at the end of an open curve.
     pace : float or None
-        Pace at which the clips were played while the stylus moved, relative to their own; None if a lap plays no clip,
-        or the field has no curve.
+        Pace at which the clips of the legs were played while the stylus moved, relative to their own; None if a lap
+        plays no clip, or the field has no curve.
+    paces : tuple of float
+        The same of each clip that is played.
+    pace_spread : tuple of float, optional
+        Paces of the hand over its mean pace that it fell below, and exceeded, for a twentieth of the time each, after
+        the first second; None as `pace`, and of a hand that stops or goes back, such as one that bends a curve.
     """
 
     deviation_rms_mm: float | None
@@ -65,14 +72,21 @@ class PathSummary:
     pushes: tuple[PushSummary, ...]
     stopped_at: float | None = None
     pace: float | None = None
+    paces: tuple[float, ...] = ()
+    pace_spread: tuple[float, float] | None = None
 
     def line(self, played: bool) -> str | None:
         """When the stylus stopped, and at what pace clips were played if they were; None if neither applies."""
         stopped = "" if self.stopped_at is None else f"The stylus stood still from {self.stopped_at:.1f} s on."
+        ends = dict.fromkeys(f"{pace:.2f}" for pace in sorted(self.paces)[:: max(len(self.paces) - 1, 1)])
+        low, high = self.pace_spread or (1.0, 1.0)
+        uneven = (
+            f"; the hand was below {low:.2f} and above {high:.2f} of its mean pace for a twentieth of the time each"
+            if low < _EVEN_PACE[0] or high > _EVEN_PACE[1]
+            else ""
+        )
         paced = (
-            ""
-            if self.pace is None or not played
-            else f"The clips were played at {self.pace:.2f} of their recorded speed."
+            f"The clips were played at {' to '.join(ends)} of their recorded speed{uneven}." if ends and played else ""
         )
         return " ".join(part for part in (stopped, paced) if part) or None
 
@@ -96,17 +110,22 @@ class AnimationSummary:
         Least height of a point of the soles above the floor.
     foot_skate_cm : float
         Largest slide of a point of the soles while it is within 3 mm of the floor (`models.mocap.motion.foot_skate`).
+    fastest_joint : float
+        Largest angular velocity of a joint [rad/s].
     """
 
     pushed_deg: float
     unpushed_deg: float
     lowest_sole_cm: float = 0.0
     foot_skate_cm: float = 0.0
+    fastest_joint: float = 0.0
 
     def soles(self) -> str:
-        """Height and slide of the soles, in a sentence."""
+        """Height and slide of the soles, and a joint that is faster than any of a human body, in a sentence."""
         lowest = round(self.lowest_sole_cm, 1) + 0.0  # no minus before a zero
-        return f"The animation's lowest sole is at {lowest:+.1f} cm; soles slide {self.foot_skate_cm:.1f} cm at most."
+        jump = f", and a joint jumps ({self.fastest_joint:.0f} rad/s)" if self.fastest_joint > _MAX_JOINT_SPEED else ""
+        slide = f"soles slide {self.foot_skate_cm:.1f} cm at most"
+        return f"The animation's lowest sole is at {lowest:+.1f} cm; {slide}{jump}."
 
 
 @dataclass(frozen=True)

@@ -66,11 +66,11 @@ def about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...], timi
     played = [clips[i % len(clips)] for i in range(len(made.loops))]
     off = off_pace(played, made.loops, curve.duration, made.laps, timing_clip(clips) if timing is None else timing)
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, lap_seconds=made.lap_seconds, reach=reach,
+        haptic_map=made, clips=clips, curve=curve, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
-        held_seconds=made.lap_seconds, remarks=(*not_blendable(clips), *off),
+        remarks=(*not_blendable(clips), *off),
     )  # fmt: skip
 
 

@@ -78,10 +78,11 @@ def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMa
     )
     between = not_blendable(clips)
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, lap_seconds=curve.duration, reach=part.reach,
+        haptic_map=made, clips=clips, curve=curve, reach=part.reach,
         rivers=lambda mode: lifted_choice(made, mode),
         river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
         course=cache(partial(course_of, curve)),
-        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY, held_seconds=curve.duration,
+        expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY,
+        curve_clip_seconds=curve.duration,
         remarks=between if curve.periodic else (ends, *between),
     )  # fmt: skip

@@ -127,7 +127,8 @@ def _make_parts(
         program=with_walls(tubes.program(), mode.walls, maps), course=course,
         user=user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
-        gains=HELD_GAINS, bends=True, held_seconds=maps.held_seconds, handled=handling_spans(user), summarise=summarise,
+        gains=HELD_GAINS, bends=True, held_seconds=float(np.nan_to_num(maps.lap_seconds)),
+        handled=handling_spans(user), summarise=summarise,
         # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
         remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.oriented),

@@ -1,15 +1,17 @@
 """Types of the parts of a run: `MapParts`, made from a map, and `Parts`, which a mode makes from these."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
+import numpy as np
 import numpy.typing as npt
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.bundle import RiverBundle
-from controllers.haptic_map.animation import ClipMap
+from controllers.haptic_map.animation import AnimationMap, ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.sized import Sized
 from controllers.safety.energy_tank import EnergyTank
@@ -87,8 +89,6 @@ class MapParts(Generic[Map]):
         Returns the map improved by what only compiled code can find, and remarks on how the physical figure follows it.
     gains : FigureGains
         Gains of the physical figure.
-    lap_seconds : float, optional
-        Mean duration of the clips [s], where a lap of the curve plays one.
     moves : bool
         Whether a run begins in motion: a walk at full speed cannot begin from rest.
     expressive : bool
@@ -110,7 +110,6 @@ class MapParts(Generic[Map]):
     curve: Trajectory
     refined: Callable[[], tuple[Map, tuple[str, ...]]] | None = None
     gains: FigureGains = field(default_factory=FigureGains)
-    lap_seconds: float | None = None
     moves: bool = False
     expressive: bool = False
     turning: bool = False
@@ -123,6 +122,16 @@ class MapParts(Generic[Map]):
     def oriented(self) -> bool:
         """Whether the stylus's orientation moves anything."""
         return self.expressive or self.turning
+
+    @property
+    def lap_durations(self) -> Array:
+        """Durations of a lap at which each clip that is played runs at its own pace [s]; empty if a lap plays none."""
+        return np.empty(0)
+
+    @property
+    def lap_seconds(self) -> float:
+        """Duration of a lap at which the clips of the legs run at their own pace [s]; NaN if a lap plays none."""
+        return math.nan
 
     @property
     def whole_map(self) -> HapticMap:
@@ -160,8 +169,8 @@ class ClipMapParts(MapParts[ClipMap]):
         Maps damping [N s/m] and stiffness [N/m] of a field to the curve along which the field leads.
     carry : float
         Factor on the default distances by which a hand bends a curve.
-    held_seconds : float
-        Duration of the clips [s]; where a hand is slower than they are, their flights are lowered to the floor.
+    curve_clip_seconds : float, optional
+        Duration of the clip of the curve [s], where every curve of the map has a clip of its own.
     """
 
     reach: float
@@ -169,7 +178,21 @@ class ClipMapParts(MapParts[ClipMap]):
     river_pushes: Callable[[Rivers, float], tuple[Push, ...]]
     course: Callable[[float, float], Trajectory]
     carry: float = 1.0
-    held_seconds: float = 0.0
+    curve_clip_seconds: float | None = None
+
+    @property
+    def lap_durations(self) -> Array:
+        """As in `MapParts`."""
+        if self.curve_clip_seconds is not None:
+            return np.array([self.curve_clip_seconds])
+        return self.haptic_map.lap_durations if isinstance(self.haptic_map, AnimationMap) else np.empty(0)
+
+    @property
+    def lap_seconds(self) -> float:
+        """As in `MapParts`."""
+        if self.curve_clip_seconds is not None:
+            return self.curve_clip_seconds
+        return self.haptic_map.lap_seconds if isinstance(self.haptic_map, AnimationMap) else math.nan
 
 
 @dataclass(frozen=True)
@@ -252,7 +275,8 @@ class Parts:
     bends : bool
         Whether the hand bends the curve; the figure then begins at rest.
     held_seconds : float
-        Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0.
+        Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0; where it is
+        slower than they are, their flights are lowered to the floor.
     walking : Walking, optional
         How a figure is led: its walker is the map's argument; without it that is the stylus pose.
     argument_at : callable

@@ -137,8 +137,8 @@ def _check_used(study: StudyConfig) -> None:
     for name, value in study.run.items():
         if all(name in condition.words for condition in conditions(study)):
             raise StudyError(
-                f"study {study.name!r}: [run] has {name} = {value}, which every condition replaces; expected it there or "
-                "in the levels of a factor"
+                f"study {study.name!r}: [run] has {name} = {value}, which every condition replaces; expected it "
+                "there, or in the levels of a factor"
             )
 
 

@@ -18,6 +18,7 @@ from sim.users.person.person_state import (
     CAPACITY,
     DECIDED,
     DRIVEN_P,
+    DRIVEN_V,
     GRIP,
     HAND_P,
     HAND_V,
@@ -65,12 +66,12 @@ def person_step(
 
 @njit
 def _begin(person: PersonState, p: Array, v: Array) -> None:
-    """Initialise the person with her hand at the stylus, moving with its velocity."""
+    """Initialise the person with her hand at the stylus and moving with it, as her muscles drive it."""
     memory, vectors = person.memory, person.vectors
     vectors[:] = 0.0
     for place in (HAND_P, DRIVEN_P, BELIEF, SHOWN):
         vectors[place] = p
-    vectors[HAND_V] = v
+    vectors[HAND_V], vectors[DRIVEN_V] = v, v
     for row in range(person.past.shape[0]):
         person.past[row, SENSED : SENSED + 3] = p
         person.past[row, SEEN : SEEN + 3] = p

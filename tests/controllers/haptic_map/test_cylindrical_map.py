@@ -92,12 +92,45 @@ def test_share_of_other_joints_scales_their_rotation(share):
             np.testing.assert_allclose(np.cross(part[12:], whole[12:]), 0.0, atol=1e-9)
             assert np.linalg.norm(part[12:]) == pytest.approx(share * np.linalg.norm(whole[12:]), rel=0.15)
     assert (f"{100 * share:.0f} % of the others' arm motion" in some.remarks[0]) == (share < 1.0)
+    assert ("plays alone" in some.remarks[0]) == (share == 0.0)
+
+
+def test_lap_at_own_pace_is_that_of_the_legs_and_others_count_only_if_they_are_blended_in():
+    clips = [(poses, fps / (1 + k)) for k, (poses, fps) in enumerate(CLIPS)]
+    whole, arms = Cylindrical(clips, R, Z), Cylindrical(clips, R, Z, upper=(3,), legs_of=2)
+    durations = [loop.duration for loop in whole.loops]
+    assert len(set(durations)) == len(durations)
+    assert whole.lap_seconds == pytest.approx(np.mean(durations))
+    assert arms.lap_seconds == durations[2]
+    np.testing.assert_allclose(arms.lap_durations, durations)
+    np.testing.assert_allclose(arms.with_share(0.0).lap_durations, durations[2:3])
 
 
 @pytest.mark.parametrize("haptic_map", [STILL, Cylindrical(CLIPS, R, Z, upper=(3,))], ids=["all joints", "above 1"])
 def test_share_out_of_range_or_without_legs_of_one_clip_raises_parameter_error(haptic_map):
     with pytest.raises(ParameterError, match="share of other joints from 0 to 1"):
         haptic_map.with_share(1.1 if haptic_map.upper else 0.5)
+
+
+@pytest.mark.parametrize("upper", [(), (3,)], ids=["all joints", "above 2"])
+def test_joint_whose_rotations_pass_half_a_turn_does_not_flip(upper):
+    clips = []
+    for sign in (1.0, -1.0):
+        poses = swinging(1, 120)
+        angle = sign * np.deg2rad(80.0 + 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 121)))
+        poses[:, 3 + 4 * 3 :] = 0.0
+        poses[:, 3 + 4 * 3], poses[:, 3 + 4 * 3 + 1] = np.cos(0.5 * angle), np.sin(0.5 * angle)
+        clips.append((poses, 30.0))
+    haptic_map, places = Cylindrical([*clips, *clips], R, Z, upper=upper), np.linspace(0.0, 2.0 * np.pi, 721)[:-1]
+    for r in (0.5 * sum(R), 0.5 * sum(R) + 1e-4):
+        joint = matrices(np.array([haptic_map.pose(stylus(r, angle, 0.0))[-4:] for angle in places]))
+        steps = np.arccos(np.clip(0.5 * (np.einsum("nij,nij->n", joint, np.roll(joint, 1, axis=0)) - 1.0), -1.0, 1.0))
+        assert steps.max() < np.deg2rad(2.0)
+    pose = stylus(0.5 * sum(R) + 2e-3, 1.0, 0.0)
+    np.testing.assert_allclose(haptic_map.jacobian(pose)[:, :3], numeric_jacobian(haptic_map, pose, 1e-5), atol=1e-4)
+    for corner in range(2):
+        pose = haptic_map.pose(stylus(*_at(corner, 0.25)))
+        assert abs(pose[-4:] @ haptic_map.loops[corner].channels(np.array([0.25]), np.zeros(1))[0, -4:]) > 0.99
 
 
 def test_pose_beyond_the_edges_equals_that_at_the_edge():
@@ -161,7 +194,7 @@ def test_lap_there_and_back_returns_to_the_same_pose():
     path = np.concatenate([np.linspace(0.1, 15.0, 400), np.linspace(15.0, 0.1, 400)])
     poses = [MOVING.pose(stylus(0.045, angle, 0.012), memory) for angle in path]
     assert np.linalg.norm(np.subtract(poses[399], poses[0])[:2]) > 0.05
-    np.testing.assert_allclose(difference(poses[-1], poses[0]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(difference(poses[-1], poses[0]), 0.0, atol=1e-8)  # places of held feet are sums of steps
     assert memory[LAPS] == 0.0
 
 

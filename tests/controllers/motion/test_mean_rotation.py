@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controllers.motion.mean import mean_derivative, mean_rotation
+from controllers.motion.mean import mean_derivative, mean_rotation, signed_mean, signed_mean_derivative
 from tests.controllers.clips_for_maps import matrices, wxyz
 from tests.derivatives import central_differences
 
 RNG = np.random.default_rng(3)
 
 
-def _mean(unit, weights):
+def _mean(unit, weights, mean=mean_rotation):
     q = np.empty(4)
-    mean_rotation(unit, weights, q)
+    mean(unit, weights, q)
     return q
 
 
@@ -75,20 +75,33 @@ def test_mean_of_rotations_half_a_turn_apart_is_the_heavier_and_finite_for_equal
     assert np.linalg.norm(equal) == pytest.approx(1.0)
 
 
+def test_signed_mean_of_two_rotations_passes_half_a_turn_and_agrees_with_the_other_mean_before():
+    for angle in np.deg2rad([10.0, 80.0, 89.0, 91.0, 130.0]):
+        unit = wxyz(Rotation.from_rotvec([[angle, 0.0, 0.0], [-angle, 0.0, 0.0]]))
+        equal = np.array([0.5, 0.5])
+        np.testing.assert_allclose(_mean(unit, equal, signed_mean), [1.0, 0.0, 0.0, 0.0], atol=1e-15)
+        assert (abs(_mean(unit, equal)[0]) > 0.999) == (angle < 0.5 * np.pi)
+
+
+@pytest.mark.parametrize(("mean", "derivative"), [(mean_rotation, mean_derivative),
+                                                  (signed_mean, signed_mean_derivative)])  # fmt: skip
 @pytest.mark.parametrize("spread", [0.0, 0.3, 0.8])
-def test_derivative_matches_finite_differences(spread):
+def test_derivative_matches_finite_differences(spread, mean, derivative):
     for _ in range(20):
         unit, weights = _case(spread)
         spin, change = RNG.normal(size=(4, 3)), RNG.normal(size=(2, 4)) * 0.1
         change -= change.mean(axis=1, keepdims=True)
         tangent = np.empty((3, 2))
-        q = _mean(unit, weights)
-        mean_derivative(unit, spin, weights, change, q, tangent)
+        unit *= np.where(unit @ unit[0] < 0.0, -1.0, 1.0)[:, None]
+        q = _mean(unit, weights, mean)
+        derivative(unit, spin, weights, change, q, tangent)
         rotations = Rotation.from_quat(np.roll(unit, -1, axis=1))
 
-        def mean_at(x, rotations=rotations, spin=spin, weights=weights, change=change):
+        def mean_at(x, rotations=rotations, unit=unit, spin=spin, weights=weights, change=change):
             # The first parameter turns the rotations and changes the weights, the second changes the weights alone.
-            q = _mean(wxyz(rotations * Rotation.from_rotvec(x[0] * spin)), weights + x @ change)
+            turned = wxyz(rotations * Rotation.from_rotvec(x[0] * spin))
+            turned *= np.sign(np.sum(turned * unit, axis=1))[:, None]
+            q = _mean(turned, weights + x @ change, mean)
             return Rotation.from_quat(np.roll(q, -1))
 
         numeric = central_differences(mean_at, np.zeros(2), 1e-5, lambda end, start: (start.inv() * end).as_rotvec())

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controllers.legs.sole_heights import SWING_HEIGHT
+from controllers.motion.lap import MEMORY
 from experiments.config.maps import Cylindrical
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
@@ -23,7 +24,7 @@ STANDING = ("walk", "cheer", "angry", "squat_dance")
 STEPPING = (("walk", "run"), ("ginga", "walk"))
 SIMILAR = (("cheer", "angry"), ("cheer", "ginga"))  # blended as a whole, legs and all
 SLOWER = (("ginga", "cheer", "walk", "angry"), ("ginga", "walk", "run", "spin"))
-ROWS = 160
+ROWS, TURN = 160, 2.0 * np.pi
 MIXTURES = [(r, z) for r in (-0.8, -0.4, 0.0, 0.45, 0.9) for z in (-0.7, 0.0, 0.3, 0.8)]
 DENSE_MIXTURES = [(r, z) for r in np.linspace(-0.9, 0.9, 10) for z in np.linspace(-0.85, 0.85, 8)]
 
@@ -58,6 +59,30 @@ def test_in_between_feet_neither_slide_nor_sink(clips):
         places = soles(FIGURE, laps(map_of(clips), r, z, count=1.5))
         assert slide(places) < 0.02, (r, z)
         assert places[..., 2].min() > -0.007, (r, z)
+
+
+def changing_mixture(h_map, held):
+    """Poses for a hand that goes outwards and inwards three times in two laps, among mixtures of its clips."""
+    memory, poses, fresh = h_map.compiled().memory, [], h_map.compiled().memory
+    for s in np.linspace(0.0, 2.0, 960):
+        angle, radius = TURN * s, CONFIG.map.around.radius - 0.5 * CONFIG.map.reach * np.cos(3.0 * np.pi * s)
+        memory[MEMORY:] = memory[MEMORY:] if held else fresh[MEMORY:]
+        x = np.array([radius * np.cos(angle), radius * np.sin(angle), 0.0, 1.0, 0.0, 0.0, 0.0])
+        poses.append(h_map.pose(x, memory))
+    return np.array(poses)
+
+
+@pytest.mark.parametrize("clips", [SIMILAR[1], *slow_params(SIMILAR[:1])])
+def test_feet_in_stance_keep_their_places_while_the_mixture_changes(clips):
+    held, dragged = (slide(soles(FIGURE, changing_mixture(map_of(clips), held))) for held in (True, False))
+    assert dragged > 0.02
+    assert held < 0.25 * dragged
+
+
+def test_feet_of_one_clip_at_all_corners_are_left_to_the_clip():
+    h_map = map_of(("cheer", "cheer", "cheer", "cheer"))
+    assert h_map.upper == ()
+    np.testing.assert_array_equal(changing_mixture(h_map, True), changing_mixture(h_map, False))
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,10 @@ def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) 
     assert figure.saturated == pytest.approx(0.1)
     assert figure.ground_force_mean == pytest.approx(1.0 - 50 / 400)
     assert figure.grounded == pytest.approx(1.0 - 30 / 380)
+    assert summary.animation is not None
+    assert summary.animation.fastest_joint == pytest.approx(0.1 / (EVERY * PERIOD))
+    assert "jumps" not in summary.animation.soles()
+    assert "at most, and a joint jumps (1500 rad/s)." in replace(summary.animation, fastest_joint=1500.0).soles()
     # A push of half a second is not an oscillation.
     assert (summary.oscillation.since, summary.oscillation.share) == (None, 0.0)
     assert (summary.tank.least_mj, summary.tank.scaled_ticks) == (pytest.approx(100.0 - 20.0 * 3.999), 100)

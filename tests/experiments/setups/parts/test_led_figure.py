@@ -1,5 +1,7 @@
 """Stances of a capture: least durations of swings and flights, feet that sink or lift briefly; where a run begins."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -9,10 +11,11 @@ from controllers.haptic_map.led import Led
 from experiments.certify.certified_leading import leading_field
 from experiments.config.modes import Lead
 from experiments.config.options import run_config
-from experiments.setups.parts.led_figure import led_parts, stances
+from experiments.setups.parts.led_figure import lap_remark, led_parts, stances
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
 from models.mocap.dynamics.contacts import Contacts
 from models.mocap.library import embedded
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.reference.reference import map_poses
 
 FPS, FRAMES = 100.0, 101
@@ -97,3 +100,18 @@ def test_clip_with_flights_is_led_by_steps_unless_it_is_authored() -> None:
     assert not from_file.haptic_map.flies
     assert from_file.gait.grounded
     assert leading_field(configs[1], Lead(), embedded("run")).walking.gait.speed == from_file.gait.speed
+
+
+@pytest.mark.parametrize("first_part", [0.1, 0.3, 0.5])
+def test_clip_that_stands_for_a_part_of_its_lap_is_said_to_be_no_steady_gait(first_part):
+    walk = embedded("walk")
+    n = walk.n_frames - 1
+    standing = np.repeat(walk.poses[:1], round(n * first_part / (1.0 - first_part)), axis=0)
+    clip = Clip(np.concatenate([standing, walk.poses]), walk.fps, "halting")
+    assert clip.closes(CLOSURE_TOLERANCE)
+    assert lap_remark(walk, "physical") == ()
+    remarks = lap_remark(clip, "kinematic")
+    assert len(remarks) == (first_part > 0.2)
+    shares = [float(re.search("is no steady gait: for ([0-9]+) %", remark)[1]) for remark in remarks]
+    np.testing.assert_allclose(shares, 100.0 * first_part, atol=3.0)
+    assert all("may fall" in remark for remark in lap_remark(clip, "physical"))

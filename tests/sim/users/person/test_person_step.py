@@ -45,6 +45,17 @@ def _held(person: PersonState, ticks: int, first: int, p: np.ndarray, force: np.
             call_as_given(person.units[0], (by_pointer(person), k * PERIOD, STEP, i, p, at_rest, force, switch))
 
 
+@njit
+def _carried(person: PersonState, ticks: int, v: np.ndarray, force: np.ndarray, switch: np.ndarray) -> float:
+    most = 0.0
+    for k in range(ticks):
+        for i in range(round(PERIOD / STEP)):
+            t = k * PERIOD + i * STEP
+            call_as_given(person.units[0], (by_pointer(person), k * PERIOD, STEP, i, t * v, v, force, switch))
+        most = max(most, np.sqrt(np.sum(force**2)))
+    return most
+
+
 class ClampedPerson:
     """A person whose stylus the test holds at a point, in the compiled unit of a run."""
 
@@ -67,6 +78,14 @@ def test_arm_and_fingers_at_rest_are_springs_in_series() -> None:
     _, stiffness, _ = arm_matrices(NOISELESS)
     series = np.linalg.inv(np.linalg.inv(stiffness) + np.eye(3) / NOISELESS.grip_stiffness)
     np.testing.assert_allclose(hand.force, -series @ moved, rtol=2e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("person", [NOISELESS, replace(NOISELESS, stiffness=3.0 * NOISELESS.stiffness)])
+def test_person_who_begins_in_motion_goes_on_with_it_unbraked(person: Person) -> None:
+    v = np.array([0.07, 0.0, 0.0])
+    hand = ClampedPerson(person, Wishes(following(0.02 * np.arange(50)[:, None] * v)))
+    # To begin with muscles that drive to a standstill takes 0.5 N and more.
+    assert _carried(hand.state, 400, v, hand.force, hand.switch) < 0.1
 
 
 def test_reflex_and_belief_change_only_after_their_delays() -> None:
