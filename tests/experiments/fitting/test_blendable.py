@@ -45,7 +45,8 @@ def test_clip_whose_wrist_goes_round_is_reported_and_one_whose_knee_does_or_that
     raised, wrist = with_turn("left_shoulder", 200.0), with_turn("left_wrist", 300.0)
     (remark,) = going_round((walk, wrist), legs)
     assert remark.startswith("capture turns left_wrist round")
-    assert going_round((walk, raised), legs) == going_round((walk, with_turn("left_knee", 300.0)), legs) == going_round((wrist,), legs) == ()
+    for clips in ((walk, raised), (walk, with_turn("left_knee", 300.0)), (wrist,)):
+        assert going_round(clips, legs) == ()
     config = run_config(map="composite", clips=("walk", "walk", "walk"), lap=walk.duration, seconds=1.0)
     assert map_parts(config, figure_model(), (walk, wrist, walk)).remarks == (remark,)
 
