@@ -278,10 +278,11 @@ class Led(KernelMap):
         self.stride = float(np.hypot(loop.drift[0], loop.drift[1]))
         self.duration = loop.duration
         if self.stride < MIN_TRAVEL or abs(turn) > MAX_TURN:
+            advice = "" if self.stride < MIN_TRAVEL else "; cut out a straight part, as by hvf prepare --loop START:END"
             raise ParameterError(
                 f"a clip that is led must go somewhere: {MIN_TRAVEL} m or more a lap, turning by at most "
                 f"{np.degrees(MAX_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
-                f"{np.degrees(turn):.0f}°. Walk and run do"
+                f"{np.degrees(turn):.0f}°. Walk and run do{advice}"
             )
         samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import natural_lap
-from models.humanoid.skeleton import CONTACT_RADIUS
+from geometry import quaternions
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.spans import spans
@@ -15,6 +17,8 @@ from sim.body.figure_state import FigureGains
 MAX_FLIGHT_TIME = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither
 MIN_FLYING_PACE, MAX_FLYING_PACE = 0.9, 1.1  # the same for clips with flights, which then need 0.8 to 1.2 of gravity
 MIN_PACE, MAX_PACE = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
+# [rad] a joint that turns farther from its zero goes round, as in 7 of 143 prepared captures: a fault of the capture
+_MAX_JOINT_TURN = np.deg2rad(240.0)
 _LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natural_lap` takes the shortest of them
 
 
@@ -41,6 +45,20 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
             lines.append(f"{clip.name} {fault}: it cannot be blended with others")
         elif flight > MAX_FLIGHT_TIME:
             lines.append(f"{clip.name} flies for {flight:.2f} s: it cannot be blended with what stays on the floor")
+    return tuple(lines)
+
+
+def going_round(clips: Sequence[Clip], legs: Sequence[Limb]) -> tuple[str, ...]:
+    """Remarks on clips in which a joint that is no limb's goes round; none if all clips are the same."""
+    if same(clips):
+        return ()
+    free = [joint - 1 for joint in range(1, len(BODIES)) if all(joint not in leg.joints for leg in legs)]
+    lines: list[str] = []
+    for clip in {clip.name: clip for clip in clips}.values():
+        cosines = quaternions.sign_continuous(clip.poses[:, 7:].reshape(clip.n_frames, -1, 4))[:, free, 0]
+        turns = 2.0 * np.arccos(np.clip((cosines * np.where(cosines.sum(axis=0) < 0.0, -1.0, 1.0)).min(axis=0), -1, 1))
+        if round_ := [JOINTS[free[k]] for k in np.flatnonzero(turns > _MAX_JOINT_TURN)]:
+            lines.append(f"{clip.name} turns {', '.join(round_)} round: blended with others, such a joint may jump")
     return tuple(lines)
 
 

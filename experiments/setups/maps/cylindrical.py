@@ -12,7 +12,7 @@ from controllers.haptic_map.cylindrical import correction_shape
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
-from experiments.fitting.blendable import keep_own_pace, same, timing_clip
+from experiments.fitting.blendable import going_round, keep_own_pace, same, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
@@ -47,7 +47,8 @@ def cylindrical_parts(
         return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
     if out_of_step(clips, len(motions), lap):
-        return replace(about_circle(place, with_legs_of(timing_clip(clips)), clips), refined=choose_legs)
+        parts = about_circle(place, with_legs_of(timing_clip(clips)), clips)
+        return replace(parts, refined=choose_legs).with_remarks(going_round(clips, legs))
     made = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
@@ -58,7 +59,7 @@ def cylindrical_parts(
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
         return (with_balance(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
 
-    return replace(about_circle(place, made, clips), refined=refined)
+    return replace(about_circle(place, made, clips), refined=refined).with_remarks(going_round(clips, legs))
 
 
 def _cached_map(
@@ -104,4 +105,5 @@ def composite_parts(
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
         return select_legs(lambda _: only, [clips[0].name], lap, parallel)
 
-    return replace(about_circle(place, made, clips, timing=0), refined=refined)
+    parts = about_circle(place, made, clips, timing=0)
+    return replace(parts, refined=refined).with_remarks(going_round(clips, legs))

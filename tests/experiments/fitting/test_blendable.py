@@ -12,12 +12,14 @@ from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap, natural_lap
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import keeps_pace, not_blendable, off_pace, timing_clip
+from experiments.fitting.blendable import going_round, keeps_pace, not_blendable, off_pace, timing_clip
+from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.governor import speeds_along
 from experiments.setups.setups import map_parts
 from experiments.setups.wiring import wire
-from models.humanoid.skeleton import figure_model
+from models.humanoid.skeleton import JOINTS, figure_model
 from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
 
 
 def test_clips_that_turn_over_or_fly_are_reported() -> None:
@@ -27,6 +29,26 @@ def test_clips_that_turn_over_or_fly_are_reported() -> None:
     assert len(remarks) == 2
     assert remarks[0].startswith("backflip turns over")
     assert remarks[1].startswith("jump flies for 0.")
+
+
+def test_clip_whose_wrist_goes_round_is_reported_and_one_whose_knee_does_or_that_raises_an_arm_is_not() -> None:
+    walk, legs = embedded("walk"), figure_legs(figure_model())
+
+    def with_turn(joint: str, degrees: float) -> Clip:
+        poses, half = walk.poses.copy(), 0.5 * np.deg2rad(degrees) * np.sin(np.linspace(0.0, np.pi, walk.n_frames))
+        at = 7 + 4 * JOINTS.index(joint)
+        poses[:, at : at + 4] = 0.0
+        poses[:, at], poses[:, at + 1] = np.cos(half), np.sin(half)
+        poses[::3, at : at + 4] *= -1.0
+        return Clip(poses, walk.fps, "capture")
+
+    raised, wrist = with_turn("left_shoulder", 200.0), with_turn("left_wrist", 300.0)
+    (remark,) = going_round((walk, wrist), legs)
+    assert remark.startswith("capture turns left_wrist round")
+    for clips in ((walk, raised), (walk, with_turn("left_knee", 300.0)), (wrist,)):
+        assert going_round(clips, legs) == ()
+    config = run_config(map="composite", clips=("walk", "walk", "walk"), lap=walk.duration, seconds=1.0)
+    assert map_parts(config, figure_model(), (walk, wrist, walk)).remarks == (remark,)
 
 
 def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
