@@ -1,5 +1,6 @@
 """The intent to hold and bend a stretchy tube."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,13 +41,16 @@ class Bend:
 
     def wishes(self, curve: Trajectory, seconds: float, seed: int) -> Wishes:
         """See `PersonIntent`."""
-        t = moments(seconds)
+        t, grabs = moments(seconds), sorted(self.grabs, key=lambda grab: grab.at)
         rows = resting(len(t))
-        for grab in self.grabs:
+        # A person plans ahead of her clock: before and after a grab the place is where it begins and ends.
+        changes = [0.5 * (before.end + after.at) for before, after in itertools.pairwise(grabs)]
+        nearest = np.searchsorted(changes, t)
+        for k, grab in enumerate(grabs):
             grip_start = grab.at + grab.reach
             carried = between(t, grip_start, grip_start + grab.seconds)
-            is_busy = (t >= grab.at) & (t < grab.end)
-            rows[is_busy, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[is_busy]
+            near, is_busy = nearest == k, (t >= grab.at) & (t < grab.end)
+            rows[near, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[near]
             rows[is_busy, ENGAGED] = 1.0
             rows[is_busy & (t >= grip_start), SWITCH] = 1.0
         return Wishes(rows, WISH_PERIOD)

@@ -140,7 +140,7 @@ def test_clip_without_net_travel_raises_parameter_error(poses, message):
 
 
 def test_clip_that_travels_in_a_bend_is_refused_with_advice():
-    with pytest.raises(ParameterError, match="turns 90°.*cut out a straight part"):
+    with pytest.raises(ParameterError, match=r"turns 90°.*cut out a straight part"):
         Led((swinging(1, travel=1.5, turns=0.25), 60.0), (LEG,))
 
 

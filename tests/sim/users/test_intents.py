@@ -144,6 +144,17 @@ def test_bend_presses_the_switch_while_it_carries() -> None:
     np.testing.assert_allclose(row_at(wishes, 3.1)[PLACE : PLACE + 3], [0.06, 0.0, 0.0], atol=1e-9)
 
 
+def test_places_beside_a_grab_are_those_at_which_it_begins_and_ends() -> None:
+    """A person plans 0.3 s ahead of her clock: with the origin there, she throws the stylus as she lets go."""
+    first = Grab(1.0, (0.02, 0.0, 0.0), seconds=1.0, hold=0.5, place=(0.04, 0.0, 0.0))
+    second = Grab(5.0, (0.0, 0.01, 0.0), seconds=1.0, hold=0.5, place=(-0.04, 0.0, 0.0))
+    wishes = Bend([second, first]).wishes(CIRCLE, 9.0, 1)
+    expected = {0.0: (0.04, 0.0, 0.0), first.end + 0.5: (0.06, 0.0, 0.0), second.at - 0.5: (-0.04, 0.0, 0.0)}
+    for t, place in (expected | {8.9: (-0.04, 0.01, 0.0)}).items():
+        np.testing.assert_allclose(row_at(wishes, t)[PLACE : PLACE + 3], place, atol=1e-9)
+        assert row_at(wishes, t)[ENGAGED] == 0.0
+
+
 def test_press_is_a_force_away_from_the_middle() -> None:
     wishes = Press([Push(1.0, 1.0, 2.0)]).wishes(CIRCLE, 4.0, 1)
     outward = CIRCLE.point(CIRCLE.start + 1.5) / 0.04
