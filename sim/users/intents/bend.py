@@ -1,6 +1,5 @@
 """The intent to hold and bend a stretchy tube."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -43,14 +42,16 @@ class Bend:
         """See `PersonIntent`."""
         t, grabs = moments(seconds), sorted(self.grabs, key=lambda grab: grab.at)
         rows = resting(len(t))
-        # A person plans ahead of her clock: before and after a grab the place is where it begins and ends.
-        changes = [0.5 * (before.end + after.at) for before, after in itertools.pairwise(grabs)]
-        nearest = np.searchsorted(changes, t)
-        for k, grab in enumerate(grabs):
-            grip_start = grab.at + grab.reach
+        # A person plans ahead of her clock, by the place's velocity and acceleration: it moves smoothly all the time.
+        left, place, path = 0.0, np.array(grabs[0].place), np.zeros((len(t), 3)) + grabs[0].place
+        for grab in grabs:
+            grip_start, carry = grab.at + grab.reach, np.array(grab.carry)
+            arrived = between(t, left, max(grab.at, left + grab.reach))
             carried = between(t, grip_start, grip_start + grab.seconds)
-            near, is_busy = nearest == k, (t >= grab.at) & (t < grab.end)
-            rows[near, PLACE : PLACE + 3] = (np.array(grab.place) + carried[:, None] * np.array(grab.carry))[near]
+            path += arrived[:, None] * (grab.place - place) + carried[:, None] * carry
+            is_busy = (t >= grab.at) & (t < grab.end)
             rows[is_busy, ENGAGED] = 1.0
             rows[is_busy & (t >= grip_start), SWITCH] = 1.0
+            left, place = grab.end, grab.place + carry
+        rows[:, PLACE : PLACE + 3] = path
         return Wishes(rows, WISH_PERIOD)

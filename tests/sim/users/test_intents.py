@@ -144,15 +144,17 @@ def test_bend_presses_the_switch_while_it_carries() -> None:
     np.testing.assert_allclose(row_at(wishes, 3.1)[PLACE : PLACE + 3], [0.06, 0.0, 0.0], atol=1e-9)
 
 
-def test_places_beside_a_grab_are_those_at_which_it_begins_and_ends() -> None:
-    """A person plans 0.3 s ahead of her clock: with the origin there, she throws the stylus as she lets go."""
-    first = Grab(1.0, (0.02, 0.0, 0.0), seconds=1.0, hold=0.5, place=(0.04, 0.0, 0.0))
-    second = Grab(5.0, (0.0, 0.01, 0.0), seconds=1.0, hold=0.5, place=(-0.04, 0.0, 0.0))
-    wishes = Bend([second, first]).wishes(CIRCLE, 9.0, 1)
-    expected = {0.0: (0.04, 0.0, 0.0), first.end + 0.5: (0.06, 0.0, 0.0), second.at - 0.5: (-0.04, 0.0, 0.0)}
-    for t, place in (expected | {8.9: (-0.04, 0.01, 0.0)}).items():
-        np.testing.assert_allclose(row_at(wishes, t)[PLACE : PLACE + 3], place, atol=1e-9)
-        assert row_at(wishes, t)[ENGAGED] == 0.0
+@pytest.mark.parametrize("pause", [0.0, 0.1, 2.0])
+def test_place_of_one_who_bends_moves_smoothly_from_grab_to_grab(pause: float) -> None:
+    """A person plans 0.3 s ahead of her clock: a place that jumps as she lets go throws the stylus away."""
+    first = Grab(1.0, (0.02, 0.0, 0.0), seconds=1.0, hold=0.5, place=(0.04, 0.0, 0.0), reach=0.8)
+    second = Grab(first.end + pause, (0.0, 0.01, 0.0), seconds=1.0, hold=0.5, place=(-0.04, 0.0, 0.0), reach=0.8)
+    wishes = Bend([second, first]).wishes(CIRCLE, 12.0, 1)
+    places, step = wishes.rows[:, PLACE : PLACE + 3], wishes.period
+    assert np.linalg.norm(np.diff(places, 2, axis=0), axis=1).max() / step**2 < 1.0  # [m/s^2]
+    expected = {0.0: first.place, first.end: (0.06, 0.0, 0.0), second.at + 0.8: second.place, 11.9: (-0.04, 0.01, 0.0)}
+    for t, place in expected.items():
+        np.testing.assert_allclose(row_at(wishes, t)[PLACE : PLACE + 3], place, atol=2e-4)
 
 
 def test_press_is_a_force_away_from_the_middle() -> None:
