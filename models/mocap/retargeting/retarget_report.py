@@ -312,7 +312,7 @@ def two_digits(number: float) -> str:
 def axis_name(direction: Array) -> str:
     """The axis nearest to a direction, such as ``+Y``."""
     axis = int(np.argmax(np.abs(direction)))
-    return f"{'+' if direction[axis] > 0 else '−'}{'XYZ'[axis]}"
+    return f"{'+' if direction[axis] > 0 else '-'}{'XYZ'[axis]}"
 
 
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:
