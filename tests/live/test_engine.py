@@ -134,6 +134,15 @@ def test_bendable_curve_keeps_its_timing_if_a_gain_changes(gain, value):
     assert np.any(engine.stylus != same.stylus)
 
 
+def test_gains_are_kept_at_the_return_to_the_beginning():
+    engine, other = make_engine("stretch-then-follow"), make_engine("stretch-then-follow", stiffness=600.0)
+    record = engine.tubes.record_at(TRACE_SIZE)
+    engine.set_gains(with_gain(engine.config, "stiffness", 600.0))
+    run(engine, 0.4)
+    engine.reset()
+    np.testing.assert_array_equal(engine.memory[:record], other.memory[:record])
+
+
 def test_gains_of_another_mode_are_refused():
     engine = make_engine()
     with pytest.raises(ParameterError, match="same mode and map"):
