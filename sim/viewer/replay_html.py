@@ -20,7 +20,7 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.drawn_curve import DrawnCurve
 from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER, rgb
-from sim.viewer.shapes import body_prefix, body_shapes, drawn_radius, tube
+from sim.viewer.shapes import body_prefix, body_shapes, distinct, drawn_radius, tube
 from sim.viewer.shown import courses
 
 FPS = 30.0  # [1/s]
@@ -170,11 +170,10 @@ class _Stage:
 
     def _extend_trail(self, index: int, start: int, stop: int) -> None:
         step = max(1, (stop - start) // 12)
-        points = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step]
-        is_distinct = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
-        if np.count_nonzero(is_distinct) < 2:
+        points = distinct(PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step])
+        if len(points) < 2:
             return
         is_pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > MIN_PUSH_FORCE
-        vertices, faces = tube(points[is_distinct], 0.007, sides=8)
+        vertices, faces = tube(points, 0.007, sides=8)
         color = rgb(USER if is_pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)

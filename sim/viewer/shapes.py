@@ -15,6 +15,7 @@ _MAX_TUBE_SHARE = (
 )
 
 _MIN_STEP = 1e-12  # [m] shortest step between two points that has a direction
+_MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path
 _MIN_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
 
 
@@ -133,6 +134,11 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray
     c, d = first[1:], np.roll(first, -1, axis=1)[1:]
     faces = np.concatenate([np.stack([a, b, d], axis=-1).reshape(-1, 3), np.stack([a, d, c], axis=-1).reshape(-1, 3)])
     return rings.reshape(-1, 3), faces
+
+
+def distinct(path: Array) -> Array:
+    """The points of a path (n, 3) that are 0.1 mm or more from the one before: tubes through others twist."""
+    return path[np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _MIN_POINT_DISTANCE]
 
 
 def drawn_radius(points: Array, radius: float) -> float:
