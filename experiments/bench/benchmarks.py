@@ -107,8 +107,8 @@ def benchmark_results() -> Iterator[BenchmarkResult]:
         "second start of a study to its first row", trials.start / start, "× its libraries", at_most=3.0
     )
     yield BenchmarkResult("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
-    made, verified = certificate_seconds()
-    yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
+    certified, verified = certificate_seconds()
+    yield in_mj_steps("certificate of the demo", 1e6 * certified, 300_000)
     yield BenchmarkResult("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
     yield in_mj_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
     per_second, per_simulated = prepare_cost()
@@ -160,8 +160,8 @@ def second_start_seconds() -> float:
 def certificate_seconds() -> tuple[float, float]:
     """Times in which new processes certify the demo's field, and verify the certificate [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        made = _command_seconds("certify", "--out", folder)
-        return made, _command_seconds("certify", "--verify", str(Path(folder) / CERTIFICATE))
+        certified = _command_seconds("certify", "--out", folder)
+        return certified, _command_seconds("certify", "--verify", str(Path(folder) / CERTIFICATE))
 
 
 def lifting_seconds() -> float:

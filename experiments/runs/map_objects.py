@@ -48,7 +48,7 @@ class _AboutCurve:
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
-    made: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
+    make_parts: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
     """Makes the map's parts for a figure."""
 
     clips: Sequence[Clip]
@@ -69,7 +69,7 @@ class _AboutCurve:
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""
-        return for_size_of(world.body, lambda model: self.made(tuple(self.clips), model, self._place()))
+        return for_size_of(world.body, lambda model: self.make_parts(tuple(self.clips), model, self._place()))
 
     def _place(self) -> Place:
         curve = check_reach(self.around)
@@ -100,7 +100,7 @@ class Cylindrical(_AboutCurve):
         If the Phantom does not reach the curve.
     """
 
-    most, made = CORNERS, staticmethod(cylindrical_parts)
+    most, make_parts = CORNERS, staticmethod(cylindrical_parts)
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,7 +120,7 @@ class Composite(_AboutCurve):
         As `Cylindrical`, of three clips.
     """
 
-    most, made = PARTS, staticmethod(composite_parts)
+    most, make_parts = PARTS, staticmethod(composite_parts)
 
 
 @dataclass(frozen=True)
@@ -162,8 +162,8 @@ class Lifted:
     @property
     def around(self) -> Trajectory:
         """The curve on which the run begins, timed by its clip: φ of a field that plays it."""
-        made, _ = self._map_and_clips
-        return made.curve(curve_number(made, self.curve))
+        haptic_map, _ = self._map_and_clips
+        return haptic_map.curve(curve_number(haptic_map, self.curve))
 
     @property
     def clips(self) -> tuple[Clip, ...]:
@@ -172,10 +172,10 @@ class Lifted:
 
     @cached_property
     def _map_and_clips(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
-        made, clips = load_figure_map(Path(self.file))
-        if not isinstance(made, LiftedMap):
-            raise SimError(f"{self.file}: its map is {type(made).__name__}; expected one that hvf.lift wrote")
-        return made, clips
+        haptic_map, clips = load_figure_map(Path(self.file))
+        if not isinstance(haptic_map, LiftedMap):
+            raise SimError(f"{self.file}: its map is {type(haptic_map).__name__}; expected one that hvf.lift wrote")
+        return haptic_map, clips
 
     def parts(self, world: World) -> ClipMapParts:
         """What the map gives a run."""

@@ -108,9 +108,9 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     timing = 0 if kind == "composite" else timing_clip(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
-    with TemporaryDirectory() as made:
+    with TemporaryDirectory() as scratch:
         if kind == "lifted":
-            file = Path(made) / "map.npz"
+            file = Path(scratch) / "map.npz"
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:

@@ -48,17 +48,17 @@ def cylindrical_parts(
 
     if out_of_step(clips, len(motions), lap):
         return replace(about_circle(place, with_legs_of(timing_clip(clips)), clips), refined=choose_legs)
-    made = _cached_map(motions, radii, (-reach, reach), legs, lap)
+    haptic_map = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
         if same(clips):
-            balanced_map = with_balance(made, figure, lap)
+            balanced_map = with_balance(haptic_map, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], made.loops[:1], lap)
+            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], haptic_map.loops[:1], lap)
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
-        return (with_balance(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
+        return (with_balance(haptic_map, figure, lap), ()) if moves_alike(haptic_map, lap) else choose_legs()
 
-    return replace(about_circle(place, made, clips), refined=refined)
+    return replace(about_circle(place, haptic_map, clips), refined=refined)
 
 
 def _cached_map(
@@ -96,12 +96,12 @@ def composite_parts(
     legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
     apart = out_of_step(clips, 3, lap)
-    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
+    haptic_map = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
 
     def refined() -> tuple[CompositeMap, tuple[str, ...]]:
-        if carries_alike(made, lap):
-            return made, ()
+        if carries_alike(haptic_map, lap):
+            return haptic_map, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
         return select_legs(lambda _: only, [clips[0].name], lap, parallel)
 
-    return replace(about_circle(place, made, clips, timing=0), refined=refined)
+    return replace(about_circle(place, haptic_map, clips, timing=0), refined=refined)
