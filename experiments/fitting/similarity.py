@@ -40,9 +40,8 @@ def moves_alike(haptic_map: Cylindrical, lap: float) -> bool:
     def find() -> Array:
         return np.array([motion_at(haptic_map, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
-    found = cached_array(
-        results_folder(__name__), "alike", (haptic_map.compiled().params, np.array([lap])), (5, 4), find
-    )
+    made_of = (haptic_map.compiled().params, np.array([lap]))
+    found = cached_array(results_folder(__name__), "alike", made_of, (5, 4), find)
     corner_median = np.median(found[1:], axis=0)
     return bool(
         found[0, 0] < corner_median[0] + _MAX_EXCESS_RESIDUAL and found[0, 2] < corner_median[2] + MAX_FOOT_SKATE
@@ -55,13 +54,11 @@ def carries_alike(haptic_map: Composite, lap: float) -> bool:
     own = Composite(lower, lower, lower, haptic_map.upper_joints, haptic_map.r_range, haptic_map.limbs, haptic_map.lap)
 
     def find() -> Array:
-        return np.array(
-            [motion_at(own, _MIDDLE, lap), *(motion_at(haptic_map, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))]
-        )
+        others = [motion_at(haptic_map, (r, 0.0), lap) for r in (0.0, 0.5, 1.0)]
+        return np.array([motion_at(own, _MIDDLE, lap), *others])
 
-    found = cached_array(
-        results_folder(__name__), "carries", (haptic_map.compiled().params, np.array([lap])), (4, 4), find
-    )
+    made_of = (haptic_map.compiled().params, np.array([lap]))
+    found = cached_array(results_folder(__name__), "carries", made_of, (4, 4), find)
     return bool(found[1:, 0].max() < found[0, 0] + _MAX_EXCESS_RESIDUAL)
 
 

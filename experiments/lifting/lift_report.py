@@ -35,7 +35,6 @@ class LiftReport(NamedTuple):
         return [*self._curve_lines(), *self._transition_lines(), *self._quality_lines()]
 
     def _curve_lines(self) -> Iterator[str]:
-        """How far apart the curves are, and each of them."""
         lifted, after, before = self.lifted, self.lifted.lifting.after, self.lifted.lifting.before
         yield (
             f"1 curve in {lifted.seconds:.1f} s."
@@ -58,7 +57,6 @@ class LiftReport(NamedTuple):
             )
 
     def _transition_lines(self) -> Iterator[str]:
-        """Where curves nearly meet, and what is remarkable of the clips."""
         lifting, names = self.lifted.lifting, self.lifted.names
         for meeting in lifting.after.meetings:
             at = meeting.transition
@@ -78,7 +76,6 @@ class LiftReport(NamedTuple):
         yield from (f"  {remark}" for remark in not_blendable(self.lifted.clips))
 
     def _quality_lines(self) -> Iterator[str]:
-        """How the map changes between the curves, and the faults of its motions."""
         quality = self.quality
         if len(self.lifted.names) > 1:
             on, between = quality.conditioning, quality.conditioning_between

@@ -66,9 +66,8 @@ def about_circle(
     """
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(haptic_map.loops))]
-    off = off_pace(
-        played, haptic_map.loops, curve.duration, haptic_map.laps, timing_clip(clips) if timing is None else timing
-    )
+    timing = timing_clip(clips) if timing is None else timing
+    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing)
     return ClipMapParts(
         haptic_map=haptic_map, clips=clips, curve=curve, lap_seconds=haptic_map.lap_seconds, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
