@@ -12,6 +12,8 @@ from mujoco import MjModel
 from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Law
+from controllers.fields.follow import Follow
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted as LiftedMap
@@ -37,8 +39,8 @@ from sim.world.world import World
 class BodyMap(Protocol):
     """Factory of a haptic map for the body of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         ...
 
 
@@ -48,8 +50,8 @@ class _AboutCurve:
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
-    make_parts: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
-    """Makes the map's parts for a figure."""
+    make_parts: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place, bool], ClipMapParts]]
+    """Makes the map's parts for a figure, and for a field with a parallel flow or without."""
 
     clips: Sequence[Clip]
     around: Trajectory = field(repr=False)
@@ -67,9 +69,11 @@ class _AboutCurve:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: self.make_parts(tuple(self.clips), model, self._place()))
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
+        parallel = any(isinstance(law, Follow) and law.parallel for law in field.program().laws)
+        clips, place = tuple(self.clips), self._place()
+        return for_size_of(world.body, lambda model: self.make_parts(clips, model, place, parallel))
 
     def _place(self) -> Place:
         curve = check_reach(self.around)
@@ -177,8 +181,8 @@ class Lifted:
             raise SimError(f"{self.file}: its map is {type(haptic_map).__name__}; expected one that hvf.lift wrote")
         return haptic_map, clips
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
         return for_size_of(world.body, lambda _: lifted_parts(*self._map_and_clips, part))
 
@@ -219,8 +223,8 @@ class RobotArm:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         return arm_parts(world.body, self.around, self.reach, self.scale)
 
 

@@ -25,9 +25,7 @@ from sim.compilation.sources import results_folder
 CORNERS = 4  # number of clips
 
 
-def cylindrical_parts(
-    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
-) -> ClipMapParts:
+def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
 
     `parallel` says whether the field keeps the pace of a hand that is pushed off its curve.
@@ -80,9 +78,7 @@ def _cached_map(
 PARTS = 3  # number of clips
 
 
-def composite_parts(
-    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
-) -> ClipMapParts:
+def composite_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool) -> ClipMapParts:
     """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
 
     `parallel` is as in `cylindrical_parts`.
