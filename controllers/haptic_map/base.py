@@ -93,9 +93,7 @@ class HapticMap(ABC):
         if callback is None:
             # Looked up by name, so that a method replaced in its class is called.
             callback = PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
-            object.__setattr__(
-                self, "_callback", callback
-            )  # keeps the callback alive, since the tick has only its address
+            object.__setattr__(self, "_callback", callback)  # kept alive here, since the tick has only its address
         origin = np.array(_ORIGIN)
         start = self.pose(origin)
         callback.begin(checked_pose(start, np.size(start), type(self).__name__, origin))

@@ -112,8 +112,7 @@ def certify_rivers(
     if isinstance(field, HigherOrder):
         found = _find_counterexample(field, rivers, places, push)
         sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
-        others = [tuple(other for other in rivers if other is not river) for river in rivers]
-        retentions = [HandRetention(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
+        retentions = [HandRetention(r, tuple(other for other in rivers if other is not r), sharing) for r in rivers]
         return verdicts | {"switching": switching(retentions, push, ceiling, found, common)}
     return verdicts | {"switching": _summed_verdict(common)}
 
