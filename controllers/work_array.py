@@ -38,10 +38,8 @@ def _stack_allocator(kind: types.Type) -> Any:
     @intrinsic(prefer_literal=True)
     def array(_: Any, shape: Any) -> Any:
         sizes = list(shape) if isinstance(shape, types.BaseTuple) else [shape]  # pyright: ignore[reportArgumentType]
-        array_type, constant = (
-            types.Array(kind, len(sizes), "C"),
-            all(isinstance(size, types.Literal) for size in sizes),
-        )
+        array_type = types.Array(kind, len(sizes), "C")
+        constant = all(isinstance(size, types.Literal) for size in sizes)
 
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             index, number = context.get_value_type(types.intp), context.get_value_type(kind)

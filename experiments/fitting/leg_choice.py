@@ -43,7 +43,7 @@ def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) ->
 def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
     """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
     verdict = trial_of(haptic_map, lap, parallel).verdict()
-    return () if verdict.bearable else (f"the physical figure {verdict} with {name} at this lap",)
+    return () if verdict.acceptable else (f"the physical figure {verdict} with {name} at this lap",)
 
 
 def select_legs(
@@ -74,11 +74,11 @@ def select_legs(
             for i in (i for i in range(len(names)) if has_sound_legs(i) is soundness):
                 haptic_map = map_with_legs(i).with_share(share)
                 verdict = trial_of(haptic_map, lap, parallel).verdict()
-                if verdict.bearable and verdict.residual <= _GOOD_RESIDUAL:
+                if verdict.acceptable and verdict.residual <= _GOOD_RESIDUAL:
                     return haptic_map, ()
                 if verdict.worse() < best_verdict.worse():
                     best, name, best_verdict = haptic_map, names[i], verdict
-            if best_verdict.bearable:
+            if best_verdict.acceptable:
                 return best, ()
     return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)
 
@@ -107,8 +107,8 @@ def followed_map(
         return Trial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), TRIAL_SECONDS, made_of)
 
     whole = trial_of(haptic_map).verdict()
-    sound = not whole.bearable or trial_of(haptic_map).is_sound()
-    if whole.bearable and sound:
+    sound = not whole.acceptable or trial_of(haptic_map).is_sound()
+    if whole.acceptable and sound:
         return haptic_map, ()
     best, best_verdict = (haptic_map, whole) if sound else (haptic_map, Verdict(np.inf, 0.0))
     for share in _SHARES:
@@ -116,8 +116,8 @@ def followed_map(
         verdict = trial_of(part).verdict()
         if verdict.worse() < best_verdict.worse():
             best, best_verdict = part, verdict
-        if best_verdict.bearable and best_verdict.residual <= _GOOD_RESIDUAL:
+        if best_verdict.acceptable and best_verdict.residual <= _GOOD_RESIDUAL:
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with the best part of it",)
+    return best, (remark if best_verdict.acceptable else f"{remark}, and {best_verdict} with the best part of it",)

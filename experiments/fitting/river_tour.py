@@ -56,7 +56,7 @@ def tour_remarks(haptic_map: RiverClips, names: Sequence[str], part: Figure, fig
     """
     made_of = (haptic_map.compiled().params, np.array([part.smoothing, part.blend]))
     verdict = Trial(__name__, lambda: tour_clip(haptic_map, part, figure), _DURATION, made_of).verdict()
-    if verdict.bearable:
+    if verdict.acceptable:
         return ()
     stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0
     change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"

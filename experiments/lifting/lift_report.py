@@ -36,15 +36,14 @@ class LiftReport(NamedTuple):
 
     def _curve_lines(self) -> Iterator[str]:
         lifted, after, before = self.lifted, self.lifted.lifting.after, self.lifted.lifting.before
-        yield (
-            f"1 curve in {lifted.seconds:.1f} s."
-            if len(lifted.names) == 1
-            else (
+        if len(lifted.names) == 1:
+            yield f"1 curve in {lifted.seconds:.1f} s."
+        else:
+            yield (
                 f"{len(lifted.names)} curves in {lifted.seconds:.1f} s: {_separation(after)} (before the arrangement "
                 f"{_separation(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
                 f"(before {100 * before.stress:.0f} %)."
             )
-        )
         for name, clip, curve, turned, rounds, closed in zip(
             lifted.names, lifted.clips, after.curves, lifted.turned, lifted.rounds, lifted.haptic_map.closed,
             strict=True,

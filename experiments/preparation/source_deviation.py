@@ -148,8 +148,8 @@ def _rotation_up(up: str) -> Array:
 
 def _best_heading(own: Array, others: Array) -> Array:
     """Rotation about the vertical that turns vectors of shape (n, k, 3) as nearly as possible into others."""
-    flat, theirs = own @ (1, 1j, 0), others @ (1, 1j, 0)
-    return quaternions.about_axis(2, np.array(np.angle(np.nansum(theirs.conj() * flat))))
+    own_level, others_level = own @ (1, 1j, 0), others @ (1, 1j, 0)
+    return quaternions.about_axis(2, np.array(np.angle(np.nansum(others_level.conj() * own_level))))
 
 
 def _figure_lines(poses: Array) -> tuple[Array, Array, Array]:

@@ -59,7 +59,7 @@ class PersonState(NamedTuple):
         Coefficients of the submovement as it is driven, and as she believes it, shape (2, 6, 3).
     learned : Array
         Learned forces [N] by part of a lap, shape (`LEARNED_PARTS`, 3).
-    chance : Array of uint64
+    rng : Array of uint64
         State of her random numbers.
     eye : Eye
         What she has learned of the figure, by which she interprets a pose.
@@ -77,7 +77,7 @@ class PersonState(NamedTuple):
     past: Array
     plans: Array
     learned: Array
-    chance: npt.NDArray[np.uint64]
+    rng: npt.NDArray[np.uint64]
     eye: Eye
 
 

@@ -98,7 +98,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         V[REFLEX, k] *= n[REFLEX_GAIN]
     tremor_gain = n[TREMOR_GAIN]
     for k in range(3):
-        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.chance)
+        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.rng)
         V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], tremor
     m[TICKS] += 1.0
 
@@ -109,7 +109,7 @@ def _advance_noise(person: PersonState, which: int, deviation: float, seconds: f
     decay = math.exp(-person.numbers[PERIOD] / seconds)
     noise_gain = deviation * math.sqrt(1.0 - decay * decay)
     for k in range(3):
-        person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.chance)
+        person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.rng)
 
 
 @njit
