@@ -29,7 +29,7 @@ class Threads:
 
         Raises
         ------
-        OSError, MemoryError
+        OSError, MemoryError, DiskFull
             If the machine lacks something.
         """
         pool, waiting = ThreadPoolExecutor(self._number), set[Future[Row]]()

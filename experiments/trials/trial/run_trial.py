@@ -23,7 +23,7 @@ from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import TrialLog, measure_trial
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
-from sim.recording.recorder import Recorder
+from sim.recording.recorder import DiskFull, Recorder
 
 State = Literal["done", "failed"]
 
@@ -108,14 +108,14 @@ def perform_trial(task: Task, maps: MapCache = MAP_CACHE) -> Row:
 
     Raises
     ------
-    OSError, MemoryError
+    OSError, MemoryError, DiskFull
         If the machine lacks something.
     """
     worker, start = f"{platform.node()}:{os.getpid()}", time.thread_time()
     try:
         config = from_json(RunConfig, task.config, "a trial's configuration")
         measures = _run_trial(config, task, maps)
-    except (OSError, MemoryError):
+    except (OSError, MemoryError, DiskFull):
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"

@@ -16,6 +16,7 @@ from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from experiments.trials.trial import run_trial
 from experiments.trials.trial.run_trial import MapCache, Row, Task, perform_trial
 from sim.compilation.sources import reached_code
+from sim.recording.recorder import DiskFull
 from sim.recording.recording import Recording
 
 pandas = pytest.importorskip("pandas")
@@ -96,14 +97,15 @@ def test_measures_of_tracing_and_exaggerating_tasks() -> None:
         assert rows[task].measures[something] > 0.0
 
 
-def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), DiskFull("run.h5: No space left")])
+def test_machine_error_is_raised_not_recorded(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     trial = small_study().trials[0]
 
     def full(*_: object) -> Row:
-        raise OSError(28, "No space left on device")
+        raise error
 
     monkeypatch.setattr(run_trial, "_simulate", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(type(error), match="No space left"):
         perform_trial(Task(trial.key, to_json(trial.config)))
 
 
