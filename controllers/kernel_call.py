@@ -67,12 +67,12 @@ def register_kernel(kernel: Any, arguments: tuple[types.Type, ...]) -> None:
         listener(kernel, arguments)
 
 
-def add_kernel_listener(keeper: _KernelListener) -> _KernelListener:
+def add_kernel_listener(listener: _KernelListener) -> _KernelListener:
     """Notify a function of every kernel, past and future; `sim.compilation` so caches the code of laws and maps."""
-    _listeners.append(keeper)
+    _listeners.append(listener)
     for kernel, arguments in _announced_kernels:
-        keeper(kernel, arguments)
-    return keeper
+        listener(kernel, arguments)
+    return listener
 
 
 @cache

@@ -38,7 +38,8 @@ def _stack_allocator(kind: types.Type) -> Any:
     @intrinsic(prefer_literal=True)
     def array(_: Any, shape: Any) -> Any:
         sizes = list(shape) if isinstance(shape, types.BaseTuple) else [shape]  # pyright: ignore[reportArgumentType]
-        made, constant = types.Array(kind, len(sizes), "C"), all(isinstance(size, types.Literal) for size in sizes)
+        array_type = types.Array(kind, len(sizes), "C")
+        constant = all(isinstance(size, types.Literal) for size in sizes)
 
         def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             index, number = context.get_value_type(types.intp), context.get_value_type(kind)
@@ -58,11 +59,11 @@ def _stack_allocator(kind: types.Type) -> Any:
             strides = [itemsize]
             for size in reversed(shapes[1:]):
                 strides.insert(0, builder.mul(strides[0], size))
-            array = context.make_array(made)(context, builder)
+            array = context.make_array(array_type)(context, builder)
             populate_array(array, data, shapes, strides, itemsize, None)
             return array._getvalue()
 
-        return made(shape), generate
+        return array_type(shape), generate
 
     return array
 

@@ -162,15 +162,15 @@ def _add_smooth_forces(params: Array, at: int, table: Array, count: int, p: Arra
     for k in range(count):
         least = min(least, table[k, _SCORE])
     total = math.exp(-sharpness * (null - least))
-    strongest, winner = total, -1
+    strongest, selected = total, -1
     for k in range(count):
         a = math.exp(-sharpness * (table[k, _SCORE] - least))
         total += a
         if a > strongest:
-            strongest, winner = a, k
+            strongest, selected = a, k
     for k in range(count):
         _add_force(params, at, table[k], math.exp(-sharpness * (table[k, _SCORE] - least)) / total, p, v, wrench)
-    return winner
+    return selected
 
 
 @njit
@@ -214,19 +214,19 @@ def higher_order_wrench(
     table = work_array((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE_SIZE))
     count = _candidates(params, at, p, _filter_velocity(crossing.look, memory, slot, hand[HAND_TIME], v), table)
     if crossing.discrete > 0.0:
-        winner = _select_river(params, at, table, count, memory, slot)
-        if winner >= 0:
-            _add_force(params, at, table[winner], 1.0, p, v, wrench)
+        selected = _select_river(params, at, table, count, memory, slot)
+        if selected >= 0:
+            _add_force(params, at, table[selected], 1.0, p, v, wrench)
     else:
-        winner = _add_smooth_forces(params, at, table, count, p, v, wrench)
-    _write_trace(params, at, table, count, winner, memory, p)
+        selected = _add_smooth_forces(params, at, table, count, p, v, wrench)
+    _write_trace(params, at, table, count, selected, memory, p)
 
 
 @njit
-def _write_trace(params: Array, at: int, table: Array, count: int, winner: int, memory: Array, p: Array) -> None:
+def _write_trace(params: Array, at: int, table: Array, count: int, selected: int, memory: Array, p: Array) -> None:
     """Write the trace for the active river, or for the nearest one if none is active."""
-    shown = winner
-    if winner < 0 and count > 0:
+    shown = selected
+    if selected < 0 and count > 0:
         shown = 0
         for k in range(1, count):
             if table[k, _DISTANCE] < table[shown, _DISTANCE]:
@@ -234,7 +234,7 @@ def _write_trace(params: Array, at: int, table: Array, count: int, winner: int, 
     first, last = 0, int(_read_crossing(params, at).rivers)
     if shown >= 0:
         first, last = int(table[shown, _RIVER]), int(table[shown, _RIVER]) + 1
-    memory[TRACE_RIVER] = -1.0 if winner < 0 else table[winner, _RIVER]
+    memory[TRACE_RIVER] = -1.0 if selected < 0 else table[selected, _RIVER]
     for river in range(first, last):
         _, _, curve = _read_river(params, at, river)
         if shown >= 0:

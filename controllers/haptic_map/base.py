@@ -48,7 +48,7 @@ class HapticMap(ABC):
 
     map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(python_map)
     """The kernel of the class (see `controllers.haptic_map.map_stages`); by default one that calls Python."""
-    _asked: ClassVar[PythonCallback | None] = None
+    _callback: ClassVar[PythonCallback | None] = None
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -59,7 +59,7 @@ class HapticMap(ABC):
         state = super().__getstate__()
         plain, *slots = state if isinstance(state, tuple) else (state,)
         if isinstance(plain, dict):
-            plain = {name: value for name, value in plain.items() if name != "_asked"}
+            plain = {name: value for name, value in plain.items() if name != "_callback"}
         return (plain, *slots) if slots else plain
 
     @property
@@ -89,20 +89,20 @@ class HapticMap(ABC):
         ParameterError
             If `pose` gives no valid configuration for the stylus at the origin of H.
         """
-        asked = self._asked
-        if asked is None:
+        callback = self._callback
+        if callback is None:
             # Looked up by name, so that a method replaced in its class is called.
-            asked = PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
-            object.__setattr__(self, "_asked", asked)  # keeps the callback alive, since the tick has only its address
+            callback = PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
+            object.__setattr__(self, "_callback", callback)  # kept alive here, since the tick has only its address
         origin = np.array(_ORIGIN)
         start = self.pose(origin)
-        asked.begin(checked_pose(start, np.size(start), type(self).__name__, origin))
-        return CompiledMap.of(self.map_kernel, asked.params, np.zeros(1))
+        callback.begin(checked_pose(start, np.size(start), type(self).__name__, origin))
+        return CompiledMap.of(self.map_kernel, callback.params, np.zeros(1))
 
     def check(self) -> None:
         """Raise the first error of a user-defined map that occurred when the tick called it, if there was one."""
-        if self._asked is not None and self._asked.error is not None:
-            raise self._asked.error
+        if self._callback is not None and self._callback.error is not None:
+            raise self._callback.error
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""

@@ -197,21 +197,21 @@ class _ClipForms(NamedTuple):
 
 
 def _forms_of_capture(
-    rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stands: Mask, capture: Capture, duration: float,
+    rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stance: Mask, capture: Capture, duration: float,
     sway: Array,
 ) -> _ClipForms:  # fmt: skip
     """Form of a capture: feet held in stance, flight phases turned into steps unless it hops on one foot or leaps far.
 
     `duration` is that of a lap [s]; the other arguments are those of `with_planted_ends`.
     """
-    flights, stride, still = runs(~np.any(stands, axis=1)), float(drift[0]), np.zeros((2, 2))
+    flights, stride, still = runs(~np.any(stance, axis=1)), float(drift[0]), np.zeros((2, 2))
     # A flight phase of the capture becomes a walking step, which is shorter.
     steps = min(stride, capture.step * len(flights)) if flights else stride
-    clip_and_limbs = (channels, drift, limbs, stands, capture.radius, duration)
+    clip_and_limbs = (channels, drift, limbs, stance, capture.radius, duration)
     planted = with_planted_ends(rows, *clip_and_limbs, steps, still if flights else sway)
-    low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stands, sway)
+    low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stance, sway)
     if low is not None:
-        return _ClipForms([solve_reach(low, steps, limbs)], steps, False, True, 1.0 / max_swing_speed_ratio(stands))
+        return _ClipForms([solve_reach(low, steps, limbs)], steps, False, True, 1.0 / max_swing_speed_ratio(stance))
     if flights:
         planted = with_planted_ends(rows, *clip_and_limbs, stride, still)
     return _ClipForms([planted], stride, bool(flights))
@@ -298,14 +298,14 @@ class Led(KernelMap):
         self._rotations = (channels.shape[1] - 3) // 4
         signs, clip_forms = closing_signs(rows, self._rotations), _ClipForms([rows], self.stride)
         if standing is not None:
-            stands = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
+            stance = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
             sway = np.zeros((2, 2)) if sway is None else sway
             if capture is None:
-                low = grounded(rows, signs, self.stride, limbs, stands, sway)
-                flies = bool(runs(~np.any(stands, axis=1)))
+                low = grounded(rows, signs, self.stride, limbs, stance, sway)
+                flies = bool(runs(~np.any(stance, axis=1)))
                 clip_forms = _ClipForms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
             else:
-                clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stands, capture, self.duration, sway)
+                clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stance, capture, self.duration, sway)
         forms, self.stride, self.flies, self.has_grounded_form, self.pace = clip_forms
         self.sways = self.has_grounded_form or (capture is not None and not self.flies)
         lags = np.array([form[:, channels.shape[1] + 3 :: N_END_CHANNELS] for form in forms])

@@ -4,10 +4,11 @@ The mean of clips with different footsteps moves both feet at once, hardly lifte
 path of each foot over the lap is computed anew from the mean path p̄:
 
 - Clearance. With the clearances h̄_j of the feet in the mean and F = Σ w_i min_j h_ij, the mean height of the clips'
-  flight phases, foot j is placed at F + A(ĥ_j), ĥ_j = h̄_j − min_k h̄_k: the lower foot is in stance.
-  A(h) = h + c h/(h + h_c) lifts a foot that makes only a small share of a step enough to clear the ground.
-- Position and heading. The foot moves in proportion to g = S((ĥ + F)/h_0), 0 in stance and 1 in swing, and catches up
-  with the mean meanwhile:
+  flight phases, foot j is placed at z = F + ĥ_j + max(0, e(ĥ_j) − Σ w_i e(ĥ_ij)), ĥ_j = h̄_j − min_k h̄_k: the lower
+  foot is in stance. e(h) = c h/(h + h_c) lifts a foot that makes only a small share of a step enough to clear the
+  ground.
+- Position and heading. The foot moves in proportion to g = S((z − h_s)/(h_0 − h_s)), 0 in stance and 1 in swing, and
+  catches up with the mean meanwhile:
 
 .. math:: p' = g\, \dot{\bar p} + \kappa\, g\, (\bar p - p) .
 
@@ -36,7 +37,7 @@ CATCH_UP = 8.0
 """Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends
 and of led captures by at most 0.1 mm."""
 
-# Largest fractions of a foot's highest lift in the lap that `STANCE_HEIGHT` and h_0 (`SWING_HEIGHT`) may take up. With
+# Largest fractions of a foot's highest lift in the lap for h_s (`STANCE_HEIGHT`) and h_0 (`SWING_HEIGHT`). With
 # half or twice h_0 a blend of cheer and ginga still slides 1.0 cm; a blend of walk, run, ginga and cheer, which no map
 # blends as a whole, slides 2.3 or 0.8 cm in the median instead of 1.0.
 _MAX_STANCE_FRACTION, _MAX_SWING_FRACTION = 0.2, 0.5

@@ -132,7 +132,7 @@ def _end_heights(limbs: Array, pose: Pose, heights: Array) -> float:
 
 
 @njit
-def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, int]:
+def pivot(limbs: Array, shown: Pose, ahead: Array, stance: Array) -> tuple[int, int]:
     """Pivot of a change: the limb in stance both before and after it, −1 if there is none.
 
     A limb that is in stance in both poses of the new motion is preferred. If several limbs are equally good, there is
@@ -146,7 +146,7 @@ def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, 
         Pose of the old motion at the change.
     ahead : Array, shape (2, nq)
         Poses of the new motion at the ends of the first and of the second step.
-    stands : Array, shape (n,)
+    stance : Array, shape (n,)
         Written: 1 where the limb is in stance in both poses of the new motion, else 0.
 
     Returns
@@ -161,7 +161,7 @@ def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, 
     low = heights < ground + _HEIGHT_TOLERANCE
     best_limb, row, best_score, equal = -1, 1, 0, 0
     for n in range(count):
-        stands[n] = 1.0 if low[1, n] and low[2, n] else 0.0
+        stance[n] = 1.0 if low[1, n] and low[2, n] else 0.0
         score = 0 if not low[0, n] else 2 * int(low[1, n]) + int(low[2, n])
         equal = 1 if score > best_score else equal + int(score == best_score)
         if score > best_score:
@@ -171,7 +171,7 @@ def pivot(limbs: Array, shown: Pose, ahead: Array, stands: Array) -> tuple[int, 
 
 @njit
 def plan_steps(
-    limbs: Array, steps: Array, shown: Array, asked: Pose, period: float, seconds: float, second: int, stands: Array
+    limbs: Array, steps: Array, shown: Array, target: Pose, period: float, seconds: float, second: int, stance: Array
 ) -> None:
     """Write how the limbs' ends come to rest at a change, and the order of their steps.
 
@@ -183,7 +183,7 @@ def plan_steps(
         Written.
     shown : Array, shape (3, nq)
         Poses of the old motion now, a period before and after.
-    asked : Pose
+    target : Pose
         Pose of the new motion now.
     period, seconds : float
         Time between the samples, and the blend time T [s].
@@ -214,9 +214,9 @@ def plan_steps(
         _relative_turns(step[_TURN:_SHIFT], ends, turns)
         _stopping_motion(turns, period, stop, _MAX_ANGULAR_ACCELERATION, rest, change)
         change[0] = turns[0]
-        limb_end(limbs[n], asked, ends[1])
+        limb_end(limbs[n], target, ends[1])
         urgency[n] = np.floor(height / _HEIGHT_TOLERANCE) + np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])
-        urgency[n] += _STANCE_URGENCY * stands[n]
+        urgency[n] += _STANCE_URGENCY * stance[n]
         if n == second:
             urgency[n] = -np.inf
     for n in range(limbs.shape[0]):

@@ -72,7 +72,7 @@ def smooth_mask(mask: Mask, rise: float, longest: float = np.inf) -> Array:
 
 
 def planted_ends(
-    channels: Array, drift: Array, limb: Limb, stands: Mask, radius: float, duration: float
+    channels: Array, drift: Array, limb: Limb, stance: Mask, radius: float, duration: float
 ) -> tuple[Array, Array]:
     """Orientation and channels of a limb's end without skate in stance; see `limb_ends.end_channels`.
 
@@ -83,7 +83,7 @@ def planted_ends(
     drift : Array, shape (3,)
         Drift ξ of the clip.
     limb : Limb
-    stands : array of bool, shape (n,)
+    stance : array of bool, shape (n,)
         Samples at which the limb is in stance.
     radius : float
         Height of the sole points over the floor in stance [m].
@@ -98,9 +98,9 @@ def planted_ends(
         Position (3) and λ.
     """
     n = len(channels)
-    hold = smooth_mask(stands, _STANCE_EDGE_FRACTION)
-    free = smooth_mask(~stands, _SWING_EDGE_FRACTION)
-    if stands.all() or not stands.any():
+    hold = smooth_mask(stance, _STANCE_EDGE_FRACTION)
+    free = smooth_mask(~stance, _SWING_EDGE_FRACTION)
+    if stance.all() or not stance.any():
         # Without swing, or without stance, the phase advances uniformly.
         free = np.ones(n)
     lag = (np.cumsum(free) - 0.5 * free) / free.sum() - (np.arange(n) + 0.5) / n
@@ -119,11 +119,11 @@ def planted_ends(
         ahead = mask * accumulated_slip(hold[:, None] * moves, np.exp(-CATCH_UP * free / free.sum()), drift[2])
         ends[:, :2] -= rotate_in_plane(-angle[:-1], ahead[:, :2])
         quaternions = product(about_axis(2, -ahead[:, 2]), quaternions)
-    level = levels(heights, stands)
-    low = (1.0 - smooth_mask(stands, _SETTLING_RATIO, _MAX_SETTLING_TIME * n / duration)) * _soft_max(
+    level = levels(heights, stance)
+    low = (1.0 - smooth_mask(stance, _SETTLING_RATIO, _MAX_SETTLING_TIME * n / duration)) * _soft_max(
         0.0, heights - level
     )
-    ends[:, 2] += low + smooth_mask(~stands, _LIFT_EDGE_FRACTION) * (_soft_max(_MIN_CLEARANCE, low) - low) - heights
+    ends[:, 2] += low + smooth_mask(~stance, _LIFT_EDGE_FRACTION) * (_soft_max(_MIN_CLEARANCE, low) - low) - heights
     return quaternions, ends
 
 
@@ -150,10 +150,10 @@ def _level_end(quaternions: Array, limb: Limb, share: Array) -> Array:
     return signed_like(levelled.as_quat(scalar_first=True), quaternions)
 
 
-def levels(heights: Array, stands: Mask) -> Array:
+def levels(heights: Array, stance: Mask) -> Array:
     """Stance height of a foot [m], shape (n,): in a stance its median, in between a smooth step to the next."""
     n, level = len(heights), np.zeros(len(heights))
-    stances = runs(stands)
+    stances = runs(stance)
     for (start, end), (following, last) in zip(stances, [*stances[1:], *stances[:1]], strict=True):
         here, there = (np.median(heights[np.arange(a, b) % n]) for a, b in ((start, end), (following, last)))
         swing = (following - end) % n
@@ -172,7 +172,7 @@ def with_planted_ends(  # noqa: PLR0913 - a clip, its limbs and its lap, each of
     channels: Array,
     drift: Array,
     limbs: Sequence[Limb],
-    stands: Mask,
+    stance: Mask,
     radius: float,
     duration: float,
     stride: float,
@@ -189,7 +189,7 @@ def with_planted_ends(  # noqa: PLR0913 - a clip, its limbs and its lap, each of
     drift : Array, shape (3,)
         ξ of the clip, along x.
     limbs : sequence of Limb
-    stands : array of bool, shape (n, limbs)
+    stance : array of bool, shape (n, limbs)
         Which limbs are in stance.
     radius : float
         Height of their sole points over the floor in stance [m].
@@ -205,7 +205,7 @@ def with_planted_ends(  # noqa: PLR0913 - a clip, its limbs and its lap, each of
     result[:, :2] += periodic_interpolation(sway, 2.0 * np.pi * np.arange(len(rows)) / len(rows))
     for j, limb in enumerate(limbs):
         at, column = first + N_END_CHANNELS * j, 3 + 4 * limb.joints[2]
-        quaternions, ends = planted_ends(channels, drift, limb, stands[:, j], radius, duration)
+        quaternions, ends = planted_ends(channels, drift, limb, stance[:, j], radius, duration)
         result[:, column : column + 4], result[:, at : at + N_END_CHANNELS] = quaternions, ends
         short.append(shortfall(result, stride, limb, at))
     # By a constant: vertical motion of the root would change the ground reaction forces.

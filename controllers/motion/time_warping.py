@@ -7,7 +7,7 @@ import numpy as np
 from geometry.arrays import Array, IntArray
 
 
-def least_cost_lead(cost: Array, changes: Sequence[int], prices: Array) -> IntArray:
+def least_cost_lead(cost: Array, changes: Sequence[int], penalties: Array) -> IntArray:
     r"""Lead at each step of the lap, by dynamic programming in a band.
 
     .. math:: \min_{\ell} \sum_k \bigl( C_{k,\,\ell_k} + p(\ell_k - \ell_{k-1}) \bigr), \qquad |\ell_k| \le m
@@ -20,7 +20,7 @@ def least_cost_lead(cost: Array, changes: Sequence[int], prices: Array) -> IntAr
         C, cost of each lead from −m to m at each step.
     changes : sequence of int
         Possible changes of the lead in a step; of equally good ones the first is taken.
-    prices : Array, shape (changes,)
+    penalties : Array, shape (changes,)
         p, cost of each change.
 
     Returns
@@ -34,7 +34,7 @@ def least_cost_lead(cost: Array, changes: Sequence[int], prices: Array) -> IntAr
     taken = np.zeros((n, leads), dtype=np.int64)
     for k in range(n):
         padded = np.pad(total, reach, constant_values=np.inf)
-        options = np.stack([padded[reach - c : reach - c + leads] + p for c, p in zip(changes, prices, strict=True)])
+        options = np.stack([padded[reach - c : reach - c + leads] + p for c, p in zip(changes, penalties, strict=True)])
         taken[k] = np.asarray(changes)[options.argmin(axis=0)]
         total = options.min(axis=0) + cost[k]
     lead, at = np.zeros(n, dtype=np.int64), middle

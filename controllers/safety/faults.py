@@ -117,7 +117,7 @@ def latch(faults: Array, code: int, t: float, value: float) -> None:
 
 
 @njit
-def first_not_finite(values: Array) -> float:
+def first_not_finite(values: Array | tuple[float, ...]) -> float:
     """The first of the values that is NaN or infinite; 0 if there is none."""
     for value in values:
         if not np.isfinite(value):
@@ -126,7 +126,23 @@ def first_not_finite(values: Array) -> float:
 
 
 @njit
-def judge_reading(  # noqa: C901 - one branch per kind of fault, the most serious first
+def _is_repeated(faults: Array, t: float, sequence: float) -> bool:
+    """Whether a numbered reading is the last one again; if so for longer than the silence, a fault is latched."""
+    if sequence != faults[_SEQUENCE]:
+        faults[_SEQUENCE], faults[_FRESH_TIME] = sequence, t
+        return False
+    if np.isnan(faults[_FRESH_TIME]):
+        faults[_FRESH_TIME] = t
+    if faults[_STARTED] == 0.0:
+        faults[FAULT_RAMP] = 0.0
+    # With a tolerance of half a period, since sums of periods are rounded.
+    if t - faults[_FRESH_TIME] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
+        latch(faults, READING_STALE, t, t - faults[_FRESH_TIME])
+    return True
+
+
+@njit
+def judge_reading(
     faults: Array,
     theta: tuple[float, float, float],
     gimbal: tuple[float, float, float],
@@ -160,26 +176,11 @@ def judge_reading(  # noqa: C901 - one branch per kind of fault, the most seriou
     int
         `HELD`, `TAKEN` or `RESTARTED`; `elapsed` gives the time that the reading spans.
     """
-    if sequence >= 0.0:
-        if sequence == faults[_SEQUENCE]:
-            if np.isnan(faults[_FRESH_TIME]):
-                faults[_FRESH_TIME] = t
-            if faults[_STARTED] == 0.0:
-                faults[FAULT_RAMP] = 0.0
-            # With a tolerance of half a period, since sums of periods are rounded.
-            if t - faults[_FRESH_TIME] > faults[_SILENCE] - 0.5 * faults[_PERIOD]:
-                latch(faults, READING_STALE, t, t - faults[_FRESH_TIME])
-            return HELD
-        faults[_SEQUENCE], faults[_FRESH_TIME] = sequence, t
-    for i in range(3):
-        if not np.isfinite(theta[i]):
-            latch(faults, READING_NOT_FINITE, t, theta[i])
-            return HELD
-        if not np.isfinite(gimbal[i]):
-            latch(faults, READING_NOT_FINITE, t, gimbal[i])
-            return HELD
-    if not np.isfinite(clock):
-        latch(faults, READING_NOT_FINITE, t, clock)
+    if sequence >= 0.0 and _is_repeated(faults, t, sequence):
+        return HELD
+    value = first_not_finite((theta[0], theta[1], theta[2], gimbal[0], gimbal[1], gimbal[2], clock))
+    if value != 0.0:
+        latch(faults, READING_NOT_FINITE, t, value)
         return HELD
     period = faults[_PERIOD]
     started = faults[_STARTED] != 0.0

@@ -114,7 +114,7 @@ def renew_limiter(limits: Array, limiter: Array) -> None:
 class ForceLimiter:
     r"""Limits of the force at the stylus: continuous force, peak force, and slew rate.
 
-    .. math:: |F| \le L(h), \qquad T\,|\dot F| \le T\,r, \qquad \dot h = (|F|^2 - h)/\tau
+    .. math:: |F| \le L(h), \qquad |\dot F| \le r, \qquad \dot h = (|F|^2 - h)/\tau
 
     The magnitude is scaled, the direction kept. h is the mean square of the force over the thermal time τ: a cold
     motor gives the peak force, a motor that has worked for several τ the continuous force (see `force_ceiling`). A

@@ -123,9 +123,9 @@ class Gait:
 
         Empty if the gait has no flight phases.
         """
-        n, stands = len(self.support), self.support > 0
-        first = np.flatnonzero(stands & ~np.roll(stands, 1))
-        last = np.flatnonzero(stands & ~np.roll(stands, -1))
+        n, stance = len(self.support), self.support > 0
+        first = np.flatnonzero(stance & ~np.roll(stance, 1))
+        last = np.flatnonzero(stance & ~np.roll(stance, -1))
         if len(first) and last[0] < first[0]:
             last = np.roll(last, -1)
         return np.stack([first, (last - first) % n + 1], axis=1) / n

@@ -97,7 +97,7 @@ class Following(NamedTuple):
 
     Attributes
     ----------
-    rate, pull, forward, backward, turn, lateral, curvature, take_off, landing, haste : float
+    rate, pull, forward, backward, turn, lateral, curvature, take_off, landing, flight_pull : float
         ω [1/s], largest |s̈| [m/s²], largest speeds [m/s], Ω [rad/s], a [m/s²], κ_max [1/m], speeds of take-off and
         landing [m/s], largest |s̈| with flight phases [m/s²] (see `controllers.walking.walking.Walking`).
     ahead, decay, stride : float
@@ -115,7 +115,7 @@ class Following(NamedTuple):
     curvature: float
     take_off: float
     landing: float
-    haste: float
+    flight_pull: float
     ahead: float
     decay: float
     stride: float
@@ -198,7 +198,7 @@ def _extend_path(follow: Following, walker: Walker, x: float, y: float) -> None:
 @njit
 def _speed_limit(follow: Following, path: Array, s: float, speed: float) -> float:
     """Largest speed at s [m/s] from which the figure can brake for every bend ahead in its direction of motion."""
-    pull, front = min(follow.pull, follow.haste), path[0]
+    pull, front = min(follow.pull, follow.flight_pull), path[0]
     square = follow.forward**2
     rows = int(0.5 * speed * speed / (pull * STEP)) + 6
     first = np.floor(s / STEP) - 2.0 if speed > 0.0 else np.floor(s / STEP) - rows + 4.0
@@ -216,7 +216,7 @@ def _speed_limit(follow: Following, path: Array, s: float, speed: float) -> floa
 def _integrate_motion(follow: Following, walker: Walker, dt: float) -> None:
     """Integrate s̈ = ω² (g − D − s) − 2 ω ṡ over `dt` [s], with bounded |s̈| and a speed limit where the path bends."""
     on_ground = walker.argument[1] > 0.5 or len(follow.stances) == 0
-    pull = follow.pull if on_ground else follow.haste
+    pull = follow.pull if on_ground else follow.flight_pull
     s, speed = walker.argument[0], walker.speed[0]
     acceleration = walker_acceleration(walker.goal[0] - follow.ahead - s, speed, follow.rate)
     speed += dt * min(max(acceleration, -pull), pull)

@@ -149,7 +149,7 @@ class Walking:
     take_off, landing : float
         Speeds, in multiples of the gait's own, above which a running gait takes its flight phases, and below which it
         stays grounded.
-    haste : float
+    flight_pull : float
         Largest |s̈| while the gait has flight phases [m/s²].
 
     Raises
@@ -172,14 +172,14 @@ class Walking:
     curvature: float = 1.0
     take_off: float = 0.9
     landing: float = 0.85
-    haste: float = 0.5
+    flight_pull: float = 0.5
 
     def __post_init__(self) -> None:
         checked("turn_one", self.turn_one, "rad/s")
         for name, unit in (
             ("scale", ""), ("rate", "1/s"), ("pull", "m/s²"), ("forward", ""), ("backward", ""),
             ("turn_two", "rad/s"), ("lateral", "m/s²"), ("curvature", "1/m"), ("take_off", ""), ("landing", ""),
-            ("haste", "m/s²"),
+            ("flight_pull", "m/s²"),
         ):  # fmt: skip
             checked(name, getattr(self, name), unit, least=1e-3)
         if not np.isfinite([*self.start, self.heading]).all():
@@ -226,7 +226,7 @@ class Walking:
             rate=self.rate, pull=self.pull, forward=self.forward * gait.speed, backward=self.backward * gait.speed,
             turn=self.turn_two, lateral=self.lateral, curvature=self.curvature,
             take_off=self.take_off * gait.speed, landing=self.landing * gait.speed,
-            haste=self.haste if gait.flies else np.inf, ahead=self.ahead,
+            flight_pull=self.flight_pull if gait.flies else np.inf, ahead=self.ahead,
             decay=float(np.exp(-STEP / self._lean_length)), stride=gait.stride, shares=self.shares,
             stances=gait.stances,
         )  # fmt: skip

@@ -113,8 +113,8 @@ def benchmark_results() -> Iterator[BenchmarkResult]:
         "recompilation after a change in one law / a cold start, processor time", recompilation_ratio(), at_most=0.1
     )
     yield BenchmarkResult("hvf --help", _command_seconds("--help") / start, "× its libraries", at_most=1.5)
-    made, verified = certificate_seconds()
-    yield in_mj_steps("certificate of the demo", 1e6 * made, 300_000)
+    certified, verified = certificate_seconds()
+    yield in_mj_steps("certificate of the demo", 1e6 * certified, 300_000)
     yield BenchmarkResult("a certificate verified", verified / start, "× the libraries' start", at_most=2.0)
     yield in_mj_steps("ten clips of 10 s lifted, with the report", 1e6 * lifting_seconds(), 900_000)
     per_second, per_simulated = prepare_cost()
@@ -186,8 +186,8 @@ def recompilation_ratio() -> float:
 def certificate_seconds() -> tuple[float, float]:
     """Times in which new processes certify the demo's field, and verify the certificate [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        made = _command_seconds("certify", "--out", folder)
-        return made, _command_seconds("certify", "--verify", str(Path(folder) / CERTIFICATE))
+        certified = _command_seconds("certify", "--out", folder)
+        return certified, _command_seconds("certify", "--verify", str(Path(folder) / CERTIFICATE))
 
 
 def lifting_seconds() -> float:

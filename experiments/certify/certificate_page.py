@@ -72,12 +72,12 @@ WORDS: dict[str, tuple[str, str]] = {
     "alpha": ("α of V", ""),
     "beta": ("β of V", ""),
     # switching
-    "score_bound": ("bound on a rival's score", ""),
+    "score_bound": ("bound on a competing river's score", ""),
     "velocity_noise": ("velocity noise from the encoders", "m/s"),
     "hysteresis": ("hysteresis", "m/s"),
     "hysteresis_dwell": ("minimum dwell time by hysteresis", "s"),
-    "least_mismatch": ("minimum velocity mismatch of a rival", "m/s"),
-    "rival_weight": ("largest weight of a rival", ""),
+    "least_mismatch": ("minimum velocity mismatch of a competing river", "m/s"),
+    "rival_weight": ("largest weight of a competing river", ""),
     "common_rate": ("decay per period of the common Lyapunov function", ""),
     # counterexamples
     "phase": ("phase of the curve", "s"),

@@ -40,7 +40,7 @@ def certified_curves(config: RunConfig) -> dict[str, Trajectory]:
     from experiments.setups.parts.pace import course_of
 
     stiffness, drag = leading_gains(config)
-    return MAP_CURVES[config.map.kind](config, config.map, partial(course_of, drag=drag, stiffness=stiffness))
+    return MAP_CURVES[config.map.kind](config.map, partial(course_of, drag=drag, stiffness=stiffness))
 
 
 def given_curves(config: RunConfig) -> dict[str, Trajectory]:
@@ -51,41 +51,39 @@ def given_curves(config: RunConfig) -> dict[str, Trajectory]:
     ParameterError, SimError, OSError
         If the map has no such curve, the Phantom does not reach a lifted one, or there is no such map.
     """
-    return MAP_CURVES[config.map.kind](config, config.map, lambda curve: curve)
+    return MAP_CURVES[config.map.kind](config.map, lambda curve: curve)
 
 
-def _lead_curve(config: RunConfig, part: Led, retime: _Retiming) -> dict[str, Trajectory]:
+def _lead_curve(part: Led, retime: _Retiming) -> dict[str, Trajectory]:
     # Imported late: loads splines, which a check of gains does not need.
     from experiments.setups.parts.leading_hand import s_curve
 
     return {"": s_curve()}
 
 
-def _circle(
-    config: RunConfig, part: Cylindrical | Composite | RiverClips | MapFile, retime: _Retiming
-) -> dict[str, Trajectory]:
+def _circle(part: Cylindrical | Composite | RiverClips | MapFile, retime: _Retiming) -> dict[str, Trajectory]:
     return {"": retime(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
 
 
-def _tilted_circle(config: RunConfig, part: RobotArm, retime: _Retiming) -> dict[str, Trajectory]:
+def _tilted_circle(part: RobotArm, retime: _Retiming) -> dict[str, Trajectory]:
     from experiments.setups.maps.robot_arm import tilted
 
     return {"": retime(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
 
 
-def _curves_of_file(config: RunConfig, part: MapFile, retime: _Retiming) -> dict[str, Trajectory]:
+def _curves_of_file(part: MapFile, retime: _Retiming) -> dict[str, Trajectory]:
     from experiments.files.map_files import Lifted, load_map
     from experiments.setups.modes.lifted_runs import curve_number, lifted_curve
 
     found = load_map(Path(part.file))
     if not isinstance(found, Lifted):
-        return _circle(config, part, retime)
+        return _circle(part, retime)
     first = found.names[curve_number(found, part.curve)]
     names = [first, *(name for name in found.names if name != first)]
     return {"" if name == first else f"_{name}": retime(lifted_curve(found, name)) for name in names}
 
 
-MAP_CURVES: dict[str, Callable[[RunConfig, Any, _Retiming], dict[str, Trajectory]]] = {
+MAP_CURVES: dict[str, Callable[[Any, _Retiming], dict[str, Trajectory]]] = {
     "cylindrical": _circle, "composite": _circle, "rivers": _circle, "file": _curves_of_file, "led": _lead_curve,
     "robot-arm": _tilted_circle,
 }  # fmt: skip

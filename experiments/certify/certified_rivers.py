@@ -15,7 +15,7 @@ from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common, common_lyapunov
-from controllers.certificates.switching.switching import HandRetention, SelectionRule, rival, switching
+from controllers.certificates.switching.switching import HandRetention, SelectionRule, competing_river, switching
 from controllers.certificates.switching.switching_search import counterexample
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.bundle import RiverBundle
@@ -47,7 +47,7 @@ def meetings(rivers: Sequence[River]) -> list[Meeting]:
     """Meetings of all ordered pairs of rivers with overlapping tubes, at the phase where their curves are nearest."""
     found: list[Meeting] = []
     for i, j in permutations(range(len(rivers)), 2):
-        distance = rival(rivers[i], rivers[j]).distance
+        distance = competing_river(rivers[i], rivers[j]).distance
         if distance.min() < rivers[i].width + rivers[j].width:
             found.append(Meeting(i, j, float(rivers[i].phases()[int(distance.argmin())])))
     return found
@@ -112,8 +112,7 @@ def certify_rivers(
     if isinstance(field, HigherOrder):
         found = _find_counterexample(field, rivers, places, push)
         sharing = SelectionRule(field.admission, field.sigma, field.hysteresis, field.form, field.look)
-        others = [tuple(other for other in rivers if other is not river) for river in rivers]
-        retentions = [HandRetention(river, them, sharing) for river, them in zip(rivers, others, strict=True)]
+        retentions = [HandRetention(r, tuple(other for other in rivers if other is not r), sharing) for r in rivers]
         return verdicts | {"switching": switching(retentions, push, ceiling, found, common)}
     return verdicts | {"switching": _summed_verdict(common)}
 

@@ -46,10 +46,10 @@ class Command:
             hints = Hints(self.up, self.rest_frame, self.roles, self.frame_rate)
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
         output = {
-            "well_formed": outcome.measures, "fidelity": outcome.made.fidelity, "followed": outcome.followed,
+            "well_formed": outcome.measures, "fidelity": outcome.prepared.fidelity, "followed": outcome.followed,
             "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
-        report = outcome.made.report
+        report = outcome.prepared.report
         lines = [*(report.notes() if report else ()), *summary(outcome)]
         say({"lines": lines, **output}, self.json)
         return 0

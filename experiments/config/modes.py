@@ -163,7 +163,21 @@ class Rivers:
 
 
 @part
-class Stretch:
+class StretchyTube:
+    """Base of modes whose curve is held and bent; its parameters are described in `Stretch`."""
+
+    kind: str
+    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
+    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MAX_STIFFNESS)
+    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
+    rubber_from: Literal["curve", "stylus"] = "curve"
+    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
+    bump: float = above(0.0, default=0.5, unit="s")
+    walls: JointWalls | None = None
+
+
+@part
+class Stretch(StretchyTube):
     """A curve that attracts the hand, can be grabbed and bends like rubber.
 
     Parameters
@@ -186,17 +200,10 @@ class Stretch:
     """
 
     kind: Literal["stretch"] = "stretch"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MAX_STIFFNESS)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
-    rubber_from: Literal["curve", "stylus"] = "curve"
-    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
-    bump: float = above(0.0, default=0.5, unit="s")
-    walls: JointWalls | None = None
 
 
 @part
-class StretchThenFollow:
+class StretchThenFollow(StretchyTube):
     """A curve that is bent, and performed by FOLLOW when the hand has finished.
 
     Parameters
@@ -210,16 +217,9 @@ class StretchThenFollow:
     """
 
     kind: Literal["stretch-then-follow"] = "stretch-then-follow"
-    seek: float | None = at_least(0.0, default=None, unit="N/m", most=MAX_STIFFNESS)
-    rubber: float = at_least(0.0, default=150.0, unit="N/m", most=MAX_STIFFNESS)
-    tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
-    rubber_from: Literal["curve", "stylus"] = "curve"
-    rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
-    bump: float = above(0.0, default=0.5, unit="s")
     stiffness: float = at_least(0.0, default=300.0, unit="N/m", most=MAX_STIFFNESS)
     damping: float = at_least(0.0, default=8.0, unit="N s/m", most=MAX_DAMPING)
     tube: float = at_least(1e-4, default=0.25, unit="m", infinite=True)
-    walls: JointWalls | None = None
 
 
 @part

@@ -130,13 +130,7 @@ def run_config(
     _check_option_types(given, {"mode": mode, "map": map, "user": user, "figure": figure, "replay": replay})
     mode_cls = _part_of_kind("mode", mode, MODES)
     if mode == "lead":
-        wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
-        if wrong:
-            raise ParameterError(
-                f"in the mode lead the map is the led figure's and the hand leads; leave out {', '.join(wrong)}"
-            )
-        if figure == "none":
-            raise ParameterError(LEAD_WITHOUT_FIGURE)
+        _check_leading(map, user, figure)
         map_cls, user = Led, "lead"
     elif map.endswith(MAP_SUFFIX):
         map_cls = MapFile
@@ -177,6 +171,17 @@ def _check_option_types(words: Mapping[str, object], chosen: Mapping[str, object
             raise ParameterError(f"--{name} is {words[name]!r}; expected true or false")
     for name in sorted({"around", "does", "file", "orientation", "run"} & words.keys()):
         raise _unknown_option(f"--{name}")
+
+
+def _check_leading(map: str, user: str, figure: str) -> None:
+    """Refuse a map and a user in the mode lead, which has its own, and a figure that cannot be led."""
+    wrong = [f"--{name} {value}" for name, value in (("map", map), ("user", user)) if value]
+    if wrong:
+        raise ParameterError(
+            f"in the mode lead the map is the led figure's and the hand leads; leave out {', '.join(wrong)}"
+        )
+    if figure == "none":
+        raise ParameterError(LEAD_WITHOUT_FIGURE)
 
 
 def _refuse_meaningless(given: Mapping[str, object], mode: str, body: str, replay: str) -> None:

@@ -50,15 +50,15 @@ def above(least: float, *, default: Any = ..., unit: str = "", most: float = MAX
 def part(cls: type[_Part]) -> type[_Part]:
     """Make a class a part of a configuration."""
     cast(Any, cls).__get_pydantic_core_schema__ = classmethod(_schema)
-    made = cast(Any, checked_dataclass(config=_CONFIG, frozen=True, kw_only=True)(cls))  # pyright: ignore
-    init, named = made.__init__, [field for field in fields(made) if field.init]
+    part_class = cast(Any, checked_dataclass(config=_CONFIG, frozen=True, kw_only=True)(cls))  # pyright: ignore
+    init, named = part_class.__init__, [field for field in fields(part_class) if field.init]
     places = [field.name for field in named if not field.kw_only]
 
     @with_keyword_messages()
     def __init__(self: object, *arguments: Any, **values: Any) -> None:
         if len(arguments) > len(places):
             raise ParameterError(
-                f"{made.__name__} is given {arguments[len(places)]!r} without a name; "
+                f"{part_class.__name__} is given {arguments[len(places)]!r} without a name; "
                 f"expected some of {', '.join(f'{field.name}=' for field in named)}"
             )
         try:
@@ -66,11 +66,11 @@ def part(cls: type[_Part]) -> type[_Part]:
         except ValidationError as error:
             own = error.errors()[0].get("ctx", {}).get("error")  # raised by the part itself
             raise (
-                own if isinstance(own, ParameterError) else ParameterError(validation_message(error, made))
+                own if isinstance(own, ParameterError) else ParameterError(validation_message(error, part_class))
             ) from None
 
-    made.__init__ = __init__
-    return cast(type[_Part], made)
+    part_class.__init__ = __init__
+    return cast(type[_Part], part_class)
 
 
 def _schema(cls: type, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:

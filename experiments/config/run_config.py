@@ -54,7 +54,7 @@ class User:
 
     def __post_init__(self) -> None:
         if self.person is None and self.does in PERSON_INTENTS:
-            raise ParameterError(f"only a person can {self.does}; add a person, such as --person median")
+            raise ParameterError(f"the user {self.does!r} takes sight and touch; add a person, such as --person median")
         if self.person is not None and (self.does == "turn" or self.turns):
             raise ParameterError(
                 "a person lets the stylus swing and does not turn it; leave out the person or the turn"

@@ -19,18 +19,18 @@ _PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a
 _TIMES = np.arange(round((TRIAL_SECONDS + 1.0) * FPS)) / FPS
 
 
-def domain(made: Cylindrical | Composite) -> Array:
+def domain(haptic_map: Cylindrical | Composite) -> Array:
     """Intervals of r and z through which the hand moves [m], shape (2, 2)."""
-    return np.array([made.r_range, made.z_range if isinstance(made, Cylindrical) else (0.0, 0.0)])
+    return np.array([haptic_map.r_range, haptic_map.z_range if isinstance(haptic_map, Cylindrical) else (0.0, 0.0)])
 
 
-def poses_about_circle(made: Cylindrical | Composite, r: Array | float, angles: Array, z: Array | float) -> Array:
+def poses_about_circle(haptic_map: Cylindrical | Composite, r: Array | float, angles: Array, z: Array | float) -> Array:
     """Poses of a map with the hand at cylindrical coordinates [m], [rad], shape (n, 75); needs compiled code."""
     points = np.broadcast_arrays(r * np.cos(angles), r * np.sin(angles), z)
-    return map_poses(made, stylus_path(np.stack(points, axis=-1)))
+    return map_poses(haptic_map, stylus_path(np.stack(points, axis=-1)))
 
 
-def tour_of_domain(made: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
+def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
@@ -39,15 +39,15 @@ def tour_of_domain(made: Cylindrical | Composite, lap: float, parallel: bool) ->
     """
     turn, pushed = 2.0 * np.pi * _TIMES / TRIAL_SECONDS, _DOMAIN_FRACTION * _push_profile(_TIMES)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
-    low, high = domain(made).T
+    low, high = domain(haptic_map).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
     elapsed = _TIMES if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
-    return Clip(poses_about_circle(made, r, 2.0 * np.pi / lap * elapsed, z), FPS, "blend")
+    return Clip(poses_about_circle(haptic_map, r, 2.0 * np.pi / lap * elapsed, z), FPS, "blend")
 
 
-def tour_along_curve(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
+def tour_along_curve(haptic_map: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
     If the field does not keep the pace off the curve (`Follow.parallel`), a push does not change the hand's speed, so
@@ -58,7 +58,7 @@ def tour_along_curve(made: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
     points = curve.point(curve.start + phases)
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
-    return Clip(map_poses(made, stylus_path(points)), FPS, "pushed")
+    return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "pushed")
 
 
 def _push_profile(times: Array) -> Array:

@@ -34,16 +34,16 @@ _GOOD_RESIDUAL = MAX_RESIDUAL_IN_FLIGHTS / 2
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
-def trial_of(made: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
+def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
     """The trial in which the physical figure follows a map about a circle for 20 s."""
-    made_of = (made.compiled().params, np.array([lap, parallel, *domain(made).ravel()]))
-    return Trial(__name__, lambda: tour_of_domain(made, lap, parallel), TRIAL_SECONDS, made_of)
+    made_of = (haptic_map.compiled().params, np.array([lap, parallel, *domain(haptic_map).ravel()]))
+    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), TRIAL_SECONDS, made_of)
 
 
-def single_clip_remarks(made: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
+def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
     """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
-    verdict = trial_of(made, lap, parallel).verdict()
-    return () if verdict.bearable else (f"the physical figure {verdict} with {name} at this lap",)
+    verdict = trial_of(haptic_map, lap, parallel).verdict()
+    return () if verdict.acceptable else (f"the physical figure {verdict} with {name} at this lap",)
 
 
 def select_legs(
@@ -72,25 +72,25 @@ def select_legs(
     for soundness in (True, False):
         for share in _SHARES:
             for i in (i for i in range(len(names)) if has_sound_legs(i) is soundness):
-                made = map_with_legs(i).with_share(share)
-                verdict = trial_of(made, lap, parallel).verdict()
-                if verdict.bearable and verdict.residual <= _GOOD_RESIDUAL:
-                    return made, ()
+                haptic_map = map_with_legs(i).with_share(share)
+                verdict = trial_of(haptic_map, lap, parallel).verdict()
+                if verdict.acceptable and verdict.residual <= _GOOD_RESIDUAL:
+                    return haptic_map, ()
                 if verdict.worse() < best_verdict.worse():
-                    best, name, best_verdict = made, names[i], verdict
-            if best_verdict.bearable:
+                    best, name, best_verdict = haptic_map, names[i], verdict
+            if best_verdict.acceptable:
                 return best, ()
     return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)
 
 
 def followed_map(
-    made: Lifted, curve: Trajectory, clip: int, arms: Sequence[int], keeps_pace: bool
+    haptic_map: Lifted, curve: Trajectory, clip: int, arms: Sequence[int], keeps_pace: bool
 ) -> tuple[Lifted, tuple[str, ...]]:
     """The map, or as much of it as the physical figure follows when pushed off a curve, and remarks.
 
     Parameters
     ----------
-    made : Lifted
+    haptic_map : Lifted
         The map.
     curve : Trajectory
         The curve that the hand follows.
@@ -106,18 +106,18 @@ def followed_map(
         made_of = part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
         return Trial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), TRIAL_SECONDS, made_of)
 
-    whole = trial_of(made).verdict()
-    sound = not whole.bearable or trial_of(made).is_sound()
-    if whole.bearable and sound:
-        return made, ()
-    best, best_verdict = (made, whole) if sound else (made, Verdict(np.inf, 0.0))
+    whole = trial_of(haptic_map).verdict()
+    sound = not whole.acceptable or trial_of(haptic_map).is_sound()
+    if whole.acceptable and sound:
+        return haptic_map, ()
+    best, best_verdict = (haptic_map, whole) if sound else (haptic_map, Verdict(np.inf, 0.0))
     for share in _SHARES:
-        part = made.with_legs_of(clip, arms, share)
+        part = haptic_map.with_legs_of(clip, arms, share)
         verdict = trial_of(part).verdict()
         if verdict.worse() < best_verdict.worse():
             best, best_verdict = part, verdict
-        if best_verdict.bearable and best_verdict.residual <= _GOOD_RESIDUAL:
+        if best_verdict.acceptable and best_verdict.residual <= _GOOD_RESIDUAL:
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (remark if best_verdict.bearable else f"{remark}, and {best_verdict} with the best part of it",)
+    return best, (remark if best_verdict.acceptable else f"{remark}, and {best_verdict} with the best part of it",)

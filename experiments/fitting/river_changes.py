@@ -100,24 +100,24 @@ class _Gate(NamedTuple):
         return f"change-{self.first}-{self.second}-{self.part}"
 
 
-def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> RiverClips:
+def with_changes(haptic_map: RiverClips, blend: float, figure: mujoco.MjModel) -> RiverClips:
     """The same map with feasible transitions between its clips; needs compiled code. Transitions found are cached.
 
     Parameters
     ----------
-    made : RiverClips
+    haptic_map : RiverClips
         Map whose rivers have laps of equal duration.
     blend : float
         Duration of the transition by offsets from which the search begins [s].
     figure : mujoco.MjModel
         Model of the figure alone.
     """
-    rivers, one_river = range(len(made.curves)), made.on_one_river()
-    made_of = (made.compiled().params, np.array([blend]))
+    rivers, one_river = range(len(haptic_map.curves)), haptic_map.on_one_river()
+    made_of = (haptic_map.compiled().params, np.array([blend]))
     gates: list[_Gate] = []
     for first, second in ((a, b) for a in rivers for b in rivers if a != b):
         strides = _stride_count(one_river, first, second)
-        stride = made.round_seconds(first) / strides
+        stride = haptic_map.round_seconds(first) / strides
         parts = max(min(int(np.ceil(stride / _TARGET_WAIT_TIME)), _MAX_GATES), int(np.ceil(stride / _MAX_WAIT_TIME)))
         span = stride / parts
         gates += [
@@ -129,28 +129,28 @@ def with_changes(made: RiverClips, blend: float, figure: mujoco.MjModel) -> Rive
             run_in_workers([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
     changes: list[ClipChange] = []
     for gate in gates:
-        rows, period = _cached_change(one_river, made_of, blend, figure, gate), made.round_seconds(gate.first)
+        rows, period = _cached_change(one_river, made_of, blend, figure, gate), haptic_map.round_seconds(gate.first)
         if len(rows):
             phases = (rows[0, 0] + period / gate.strides * np.arange(gate.strides)) % period
             changes.append(ClipChange(gate.first, gate.second, phases, rows[1:]))
-    return made.with_changes(changes)
+    return haptic_map.with_changes(changes)
 
 
 def _cached_change(
-    made: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate
+    haptic_map: RiverClips, made_of: tuple[Array, Array], blend: float, figure: mujoco.MjModel, gate: _Gate
 ) -> Array:
     """Result of `_change`, cached under the data of which the map is made."""
 
     def find() -> Array:
-        return _change(made, blend, figure, gate.first, gate.second, gate.moments)
+        return _change(haptic_map, blend, figure, gate.first, gate.second, gate.moments)
 
     return cached_array(results_folder(__name__), gate.name, made_of, _ROW_SHAPE, find)
 
 
-def _stride_count(made: RiverClips, first: int, second: int) -> int:
+def _stride_count(haptic_map: RiverClips, first: int, second: int) -> int:
     """Number of equal strides into which a round of both clips divides."""
     rounds = [
-        _clip_poses(made, river, np.arange(_SAMPLES) * made.round_seconds(river) / _SAMPLES)[:, 7:]
+        _clip_poses(haptic_map, river, np.arange(_SAMPLES) * haptic_map.round_seconds(river) / _SAMPLES)[:, 7:]
         for river in (first, second)
     ]
     for strides in range(_MAX_STRIDES, 1, -1):
@@ -161,33 +161,34 @@ def _stride_count(made: RiverClips, first: int, second: int) -> int:
     return 1
 
 
-def _clip_poses(made: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
+def _clip_poses(haptic_map: RiverClips, river: int, phases: Array, memory: Array | None = None) -> Array:
     """Poses of a river's clip at phases [s] after the start of the round, beginning with a given memory of the map."""
-    curve, start_memory = made.curves[river], _memory_at(made, phases[0]) if memory is None else memory.copy()
+    curve = haptic_map.curves[river]
+    start_memory = _memory_at(haptic_map, phases[0]) if memory is None else memory.copy()
     start_memory[ACTIVE_RIVER] = river
-    return map_poses(made, stylus_path(curve.point(curve.start + phases % curve.duration)), start_memory)
+    return map_poses(haptic_map, stylus_path(curve.point(curve.start + phases % curve.duration)), start_memory)
 
 
-def _memory_at(made: RiverClips, phase: float) -> Array:
+def _memory_at(haptic_map: RiverClips, phase: float) -> Array:
     """Memory of a run that begins at a phase [s] after the start of the round."""
-    memory, start = made.compiled().memory, made.curves[0].start
-    memory[HAND_PHASE] = start + phase % made.round_seconds(0)
+    memory, start = haptic_map.compiled().memory, haptic_map.curves[0].start
+    memory[HAND_PHASE] = start + phase % haptic_map.round_seconds(0)
     return memory
 
 
 def _make_passage(
-    made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
+    haptic_map: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moment: float
 ) -> _Passage | None:
     """The transition from one river's clip to another's at or soon after a moment of the round [s]; None if none."""
-    curve, period = made.curves[first], made.round_seconds(first)
+    curve, period = haptic_map.curves[first], haptic_map.round_seconds(first)
     lap = curve.duration
     begin = period + moment - _TIME_BEFORE - _CONTEXT - _SETTLING
     times = begin + np.arange(_BLOCK * round(_TIMEOUT * FPS / _BLOCK)) / FPS
     stylus = stylus_path(curve.point(curve.start + times % lap))
-    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
+    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), haptic_map.nq))
     traces[:, TRACE_RIVER] = np.where(times < period + moment, first, second)
     traces[:, TRACE_PHASE] = curve.start + times % lap
-    compiled = made.compiled()._replace(memory=_memory_at(made, times[0]))
+    compiled = haptic_map.compiled()._replace(memory=_memory_at(haptic_map, times[0]))
     compiled.memory[ACTIVE_RIVER] = first
     reference = make_reference(figure, compiled, 1.0 / FPS, _BANDWIDTH, blend, packed_legs(figure))
     changed, tail = None, round((_TIME_AFTER + _CONTEXT) * FPS)
@@ -199,15 +200,17 @@ def _make_passage(
             rest = slice(part.stop, part.stop + tail)
             reference_along(reference, stylus[rest], traces[rest], poses[rest])
             rows = np.arange(changed - round((_TIME_BEFORE + _CONTEXT) * FPS), rest.stop)
-            second_poses = _clip_poses(made, second, times[rows[::-1]], reference.memory)[::-1]
+            second_poses = _clip_poses(haptic_map, second, times[rows[::-1]], reference.memory)[::-1]
             return _Passage(poses[rows], second_poses, float((times[rows[0]] + _CONTEXT) % period))
     return None
 
 
-def _change(made: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array) -> Array:
+def _change(
+    haptic_map: RiverClips, blend: float, figure: mujoco.MjModel, first: int, second: int, moments: Array
+) -> Array:
     """The gate [s] as a first row, then the offsets (n, 57) of the transition that begins there; (0, 57) if none."""
-    passages = [_make_passage(made, blend, figure, first, second, float(moment)) for moment in moments]
-    longest = MAX_CHANGE_FRACTION * made.round_seconds(first)
+    passages = [_make_passage(haptic_map, blend, figure, first, second, float(moment)) for moment in moments]
+    longest = MAX_CHANGE_FRACTION * haptic_map.round_seconds(first)
     usable = [passage for passage in passages if passage is not None and passage.clip().duration < longest]
     if not usable:
         return np.zeros((0, N_TANGENT))

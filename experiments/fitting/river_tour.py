@@ -20,30 +20,32 @@ _DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and 
 _DURATION = _DWELL_TIME * len(_ORDER)
 
 
-def tour_clip(made: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
+def tour_clip(haptic_map: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:
     """The animation of a hand that moves at the rivers' pace and makes each change between two of the rivers once."""
     # The stylus filter begins at rest: its first second is dropped.
     times = np.arange(round((_DURATION + 2.0) * FPS)) / FPS - 1.0
     stop = np.clip(times // _DWELL_TIME, 0, len(_ORDER) - 1).astype(int)
     order = np.array(_ORDER)
     share = smooth_steps((times - _DWELL_TIME * stop) / _TRANSFER_TIME)[:, None]
-    phases = np.array([curve.start + times % curve.duration for curve in made.curves])
-    points = np.array([curve.point(phase) for curve, phase in zip(made.curves, phases, strict=True)])
+    phases = np.array([curve.start + times % curve.duration for curve in haptic_map.curves])
+    points = np.array([curve.point(phase) for curve, phase in zip(haptic_map.curves, phases, strict=True)])
     rows = np.arange(len(times))
     current, previous = points[order[stop], rows], points[order[np.maximum(stop - 1, 0)], rows]
-    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), made.nq))
+    traces, poses = np.zeros((len(times), TRACE_SIZE)), np.empty((len(times), haptic_map.nq))
     traces[:, TRACE_RIVER], traces[:, TRACE_PHASE] = order[stop], phases[order[stop], rows]
-    reference = make_reference(figure, made.compiled(), 1.0 / FPS, part.smoothing, part.blend, packed_legs(figure))
+    reference = make_reference(
+        figure, haptic_map.compiled(), 1.0 / FPS, part.smoothing, part.blend, packed_legs(figure)
+    )
     reference_along(reference, stylus_path(previous + share * (current - previous)), traces, poses)
     return Clip(poses[times >= 0.0], FPS, "rivers")
 
 
-def tour_remarks(made: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
+def tour_remarks(haptic_map: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
     """Remark on a map of three rivers, if the physical figure does not follow it; needs compiled code.
 
     Parameters
     ----------
-    made : RiverClips
+    haptic_map : RiverClips
         The map.
     names : sequence of str
         Names of the rivers' clips.
@@ -52,9 +54,9 @@ def tour_remarks(made: RiverClips, names: Sequence[str], part: Figure, figure: m
     figure : mujoco.MjModel
         Model of the figure alone.
     """
-    made_of = (made.compiled().params, np.array([part.smoothing, part.blend]))
-    verdict = Trial(__name__, lambda: tour_clip(made, part, figure), _DURATION, made_of).verdict()
-    if verdict.bearable:
+    made_of = (haptic_map.compiled().params, np.array([part.smoothing, part.blend]))
+    verdict = Trial(__name__, lambda: tour_clip(haptic_map, part, figure), _DURATION, made_of).verdict()
+    if verdict.acceptable:
         return ()
     stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0
     change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"

@@ -31,41 +31,44 @@ def upper_joints(legs: Sequence[Limb]) -> list[int]:
     return sorted(set(range(1, len(BODIES))).difference(*(leg.joints for leg in legs)))
 
 
-def moves_alike(made: Cylindrical, lap: float) -> bool:
+def moves_alike(haptic_map: Cylindrical, lap: float) -> bool:
     """Whether residual and foot skate in the middle of a map are little above the median at its corners.
 
     Needs compiled code; the measures are cached beside it.
     """
 
     def find() -> Array:
-        return np.array([motion_at(made, place, lap) for place in (_MIDDLE, *_CORNERS)])
+        return np.array([motion_at(haptic_map, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
-    found = cached_array(results_folder(__name__), "alike", (made.compiled().params, np.array([lap])), (5, 4), find)
+    made_of = (haptic_map.compiled().params, np.array([lap]))
+    found = cached_array(results_folder(__name__), "alike", made_of, (5, 4), find)
     corner_median = np.median(found[1:], axis=0)
     return bool(
         found[0, 0] < corner_median[0] + _MAX_EXCESS_RESIDUAL and found[0, 2] < corner_median[2] + MAX_FOOT_SKATE
     )
 
 
-def carries_alike(made: Composite, lap: float) -> bool:
+def carries_alike(haptic_map: Composite, lap: float) -> bool:
     """Whether the residual of a composite map's legs grows little with other clips' upper bodies."""
-    lower = made.clips[0]
-    own = Composite(lower, lower, lower, made.upper_joints, made.r_range, made.limbs, made.lap)
+    lower = haptic_map.clips[0]
+    own = Composite(lower, lower, lower, haptic_map.upper_joints, haptic_map.r_range, haptic_map.limbs, haptic_map.lap)
 
     def find() -> Array:
-        return np.array([motion_at(own, _MIDDLE, lap), *(motion_at(made, (r, 0.0), lap) for r in (0.0, 0.5, 1.0))])
+        others = [motion_at(haptic_map, (r, 0.0), lap) for r in (0.0, 0.5, 1.0)]
+        return np.array([motion_at(own, _MIDDLE, lap), *others])
 
-    found = cached_array(results_folder(__name__), "carries", (made.compiled().params, np.array([lap])), (4, 4), find)
+    made_of = (haptic_map.compiled().params, np.array([lap]))
+    found = cached_array(results_folder(__name__), "carries", made_of, (4, 4), find)
     return bool(found[1:, 0].max() < found[0, 0] + _MAX_EXCESS_RESIDUAL)
 
 
-def motion_at(made: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
+def motion_at(haptic_map: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
     """Measure a lap [s] of a map round a circle, at shares `place` of its domain in r and z; needs compiled code."""
-    low, high = domain(made).T
+    low, high = domain(haptic_map).T
     r, z = low + np.array(place) * (high - low)
     rows = max(64, round(_FPS * lap))
     # The last pose repeats the first, as in a closed clip: otherwise the motion would count as one that stops.
-    return motion_of(poses_about_circle(made, r, 2.0 * np.pi * np.arange(rows + 1) / rows, z), rows / lap)
+    return motion_of(poses_about_circle(haptic_map, r, 2.0 * np.pi * np.arange(rows + 1) / rows, z), rows / lap)
 
 
 def arms(legs: Sequence[Limb]) -> list[int]:

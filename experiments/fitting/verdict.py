@@ -81,7 +81,7 @@ class Verdict(NamedTuple):
         return bool(np.isfinite(self.fell))
 
     @property
-    def bearable(self) -> bool:
+    def acceptable(self) -> bool:
         """Whether it does not fall and its residual is at most `MAX_RESIDUAL_IN_FLIGHTS`."""
         return not self.falls and self.residual <= MAX_RESIDUAL_IN_FLIGHTS
 

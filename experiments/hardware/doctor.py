@@ -80,8 +80,8 @@ def _libraries() -> list[Finding]:
 
 
 def _permissions(devices: list[FoundDevice]) -> list[Finding]:
-    ours = [device for device in devices if device.kind in ("phantom", "spacemouse")]
-    if not ours:
+    connected = [device for device in devices if device.kind in ("phantom", "spacemouse")]
+    if not connected:
         return [Finding("devices", MISSING, "no Phantom over HID and no SpaceMouse is connected")]
     return [
         Finding(device.path, OK, f"{device.product}: this user may open it")
@@ -91,7 +91,7 @@ def _permissions(devices: list[FoundDevice]) -> list[Finding]:
             f"put this line into {RULES_FILE}, then run `udevadm control --reload` and plug the device in again:\n"
             f"{'':9}{device.udev_rule()}",
         )
-        for device in ours
+        for device in connected
     ]  # fmt: skip
 
 

@@ -194,17 +194,17 @@ def _check_permit(config: RunConfig, options: RunHardware, console: Console) -> 
 @contextlib.contextmanager
 def emulated(make: MakeEmulated, realtime: bool) -> Generator[socket.socket, None, None]:
     """Run the emulated device in its own process; yields the servo's end of the socket."""
-    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    servo_end, device_end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     shown = SharedNumbers(SHOWN_SIZE)
-    end = EmulatedEnd(theirs, shown, make.scene.servo_period)
+    end = EmulatedEnd(device_end, shown, make.scene.servo_period)
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=host_device, args=(make, end, realtime), name="device", daemon=True)
     start_without_sigint(process)
-    theirs.close()
+    device_end.close()
     try:
-        yield ours
+        yield servo_end
     finally:
-        ours.close()
+        servo_end.close()
         process.kill()
         process.join()
         shown.close()

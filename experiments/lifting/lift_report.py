@@ -1,6 +1,6 @@
 """Lifting of clips into a file, and its report: curves, transitions and in-betweens, in words and as data."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,63 +32,68 @@ class LiftReport(NamedTuple):
 
     def lines(self) -> list[str]:
         """The report in words, a line each."""
-        lifting, names = self.lifted.lifting, self.lifted.names
-        after, before = lifting.after, lifting.before
-        lines = [f"1 curve in {self.lifted.seconds:.1f} s."]
-        if len(names) > 1:
-            lines = [
-                f"{len(names)} curves in {self.lifted.seconds:.1f} s: {_separation(after)} (before the arrangement "
+        return [*self._curve_lines(), *self._transition_lines(), *self._quality_lines()]
+
+    def _curve_lines(self) -> Iterator[str]:
+        lifted, after, before = self.lifted, self.lifted.lifting.after, self.lifted.lifting.before
+        if len(lifted.names) == 1:
+            yield f"1 curve in {lifted.seconds:.1f} s."
+        else:
+            yield (
+                f"{len(lifted.names)} curves in {lifted.seconds:.1f} s: {_separation(after)} (before the arrangement "
                 f"{_separation(before)}); distances are those of the motions within {100 * after.stress:.0f} % "
                 f"(before {100 * before.stress:.0f} %)."
-            ]
+            )
         for name, clip, curve, turned, rounds, closed in zip(
-            names, self.lifted.clips, after.curves, self.lifted.turned, self.lifted.rounds,
-            self.lifted.haptic_map.closed, strict=True,
+            lifted.names, lifted.clips, after.curves, lifted.turned, lifted.rounds, lifted.haptic_map.closed,
+            strict=True,
         ):  # fmt: skip
             kind = "there and back" if turned else "closed" if closed else "open, the hand is held at its end"
             kind = kind if rounds == 1 else f"{rounds} times round"
-            lines.append(
+            yield (
                 f"  {name}: {kind}, {clip.duration:.2f} s, radius of curvature from "
                 f"{1e3 * curve.radius:.0f} mm, up to {curve.speed:.2f} m/s and {curve.acceleration:.2f} m/s²"
             )
-        for meeting in after.meetings:
+
+    def _transition_lines(self) -> Iterator[str]:
+        lifting, names = self.lifted.lifting, self.lifted.names
+        for meeting in lifting.after.meetings:
             at = meeting.transition
-            lines.append(
+            yield (
                 f"  transition {names[at.first]} – {names[at.second]} at {np.degrees(at.angle):.0f}°: poses "
                 f"{at.pose:.2f}, velocities {at.velocity:.2f}, standing feet {at.support:.2f} apart (relative), the "
                 f"figures at {at.speeds[0]:.1f} and {at.speeds[1]:.1f} m/s; the curves pass "
                 f"{1e3 * meeting.distance:.1f} mm apart at {np.degrees(meeting.slant):.0f}°, "
                 f"{meeting.speeds[0]:.2f} and {meeting.speeds[1]:.2f} m/s"
             )
-        if not after.meetings and len(names) > 1:
-            lines.append("  no transition: nowhere do two of these motions nearly agree in pose and velocity")
-        lines += [
-            f"  {', '.join(names[i] for i in group)} are the same motion: one of them is enough"
-            for group in _same_motion_groups(lifting.same)
-        ]
-        lines += [f"  {names[i]} stands still: along its curve nothing changes" for i in lifting.still]
-        lines += [f"  {remark}" for remark in not_blendable(self.lifted.clips)]
+        if not lifting.after.meetings and len(names) > 1:
+            yield "  no transition: nowhere do two of these motions nearly agree in pose and velocity"
+        for group in _same_motion_groups(lifting.same):
+            yield f"  {', '.join(names[i] for i in group)} are the same motion: one of them is enough"
+        for i in lifting.still:
+            yield f"  {names[i]} stands still: along its curve nothing changes"
+        yield from (f"  {remark}" for remark in not_blendable(self.lifted.clips))
+
+    def _quality_lines(self) -> Iterator[str]:
         quality = self.quality
-        if len(names) > 1:
+        if len(self.lifted.names) > 1:
             along, between = map(_conditioning_text, (quality.conditioning, quality.conditioning_between))
-            lines += [
-                f"Condition number of h_* along the curves: {along}; half way between: {between}.",
+            yield f"Condition number of h_* along the curves: {along}; half way between: {between}."
+            yield (
                 f"h_* changes by {100 * quality.roughness[0]:.0f} % a millimetre in the median, 9 of 10 below "
-                f"{100 * quality.roughness[1]:.0f} %.",
-            ]
-        lines += [
-            *(f"  in-between {pair}: {_fault_text(measure)}" for pair, measure in quality.between.items()),
-            f"  the clips themselves: {_fault_text(quality.clips)}",
-        ]
+                f"{100 * quality.roughness[1]:.0f} %."
+            )
+        for pair, measure in quality.between.items():
+            yield f"  in-between {pair}: {_fault_text(measure)}"
+        yield f"  the clips themselves: {_fault_text(quality.clips)}"
         if broken := [pair for pair, measure in quality.between.items() if not _is_motion(measure)]:
-            lines.append(
+            yield (
                 f"No motion half way: {', '.join(broken)} (feet slide by more than {100 * _MAX_SLIDE:.0f} cm, a "
                 f"joint is {np.degrees(MAX_JOINT_EXCESS):.0f}° or more beyond its limits, or the body "
                 f"{100 * MAX_PENETRATION:.0f} cm below ground). "
                 "A run with the physical figure tries the map first, and plays the legs of a curve's own clip where it "
                 "does not follow the whole."
             )
-        return lines
 
     def to_json(self) -> dict[str, object]:
         """The report as data for JSON."""

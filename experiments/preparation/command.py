@@ -51,13 +51,13 @@ def prepare_file(
     source, target = given_path("source", source), given_path("target", target)
     report = None if report is None else given_path("report", report)
     check_target(target, overwrite)
-    made = prepared(source, loop, mirror, hints)
-    found = clip_ballistics(made.clip)
+    result = prepared(source, loop, mirror, hints)
+    found = clip_ballistics(result.clip)
     refuted = tuple(flight.reason for flight in found.flights if flight.verdict == "refuted")
-    outcome = PreparedFile(made, *_measure(made.clip), refuted, doubts(found))
-    captured = None if report is None else _measure(made.captured)
+    outcome = PreparedFile(result, *_measure(result.clip), refuted, doubts(found))
+    captured = None if report is None else _measure(result.captured)
     with writing(target):
-        write_bvh(made.clip, target)
+        write_bvh(result.clip, target)
         if report is not None and captured is not None:
             from experiments.preparation.page import page  # late: matplotlib and viser
 

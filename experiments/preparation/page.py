@@ -10,9 +10,9 @@ from experiments.preparation.side_by_side_replay import both_html
 
 def page(outcome: PreparedFile, captured: Measured) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
-    made, (before, follows) = outcome.made, captured
-    picture = image(filmstrip({"as captured": made.captured, "prepared": made.clip}), "stick figures")
-    gap_before, gap = gaps(made)
+    prepared, (before, follows) = outcome.prepared, captured
+    picture = image(filmstrip({"as captured": prepared.captured, "prepared": prepared.clip}), "stick figures")
+    gap_before, gap = gaps(prepared)
     names = ("soles", "ends", "continuity", "dynamics", "loop", "physical figure")
     captured_lines = (*before.lines(), gap_before, follows.line())
     prepared_lines = (*outcome.measures.lines(), gap, outcome.followed.line())
@@ -29,14 +29,14 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
     body = (
         f'<p>{verdict} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
-        + listed("What was changed", changes(made))
+        + listed("What was changed", changes(prepared))
         + listed(
             "What is not within bounds, not certified, or not in the clip",
             (*outcome.faults(), *outcome.doubts, *outcome.advice()),
         )
-        + f'<iframe title="both in 3D" srcdoc="{escape(both_html(made.captured, made.clip))}"></iframe>'
+        + f'<iframe title="both in 3D" srcdoc="{escape(both_html(prepared.captured, prepared.clip))}"></iframe>'
         + picture
-        + listed("How the file was read", made.report.lines() if made.report else ())
+        + listed("How the file was read", prepared.report.lines() if prepared.report else ())
     )
     style = "th, td { text-align: left; vertical-align: top; }"
-    return html_page(f"{made.clip.name}, prepared", body, style)
+    return html_page(f"{prepared.clip.name}, prepared", body, style)

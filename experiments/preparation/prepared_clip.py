@@ -95,7 +95,7 @@ class _Capture(NamedTuple):
         from models.mocap.preparation.prepare import prepared  # imported late: loads signal processing
 
         with working(f"preparing {self.path.name}"):
-            made = prepared(self.path)
-        header = np.zeros((1, made.clip.poses.shape[1]))
-        header[0, :2] = made.clip.fps, made.near
-        return np.vstack((header, made.clip.poses))
+            result = prepared(self.path)
+        header = np.zeros((1, result.clip.poses.shape[1]))
+        header[0, :2] = result.clip.fps, result.near
+        return np.vstack((header, result.clip.poses))

@@ -38,7 +38,7 @@ class PreparedFile(NamedTuple):
 
     Attributes
     ----------
-    made : Prepared
+    prepared : Prepared
         The clip and the steps of its preparation.
     measures : WellFormed
         Measures of the clip.
@@ -50,7 +50,7 @@ class PreparedFile(NamedTuple):
         Other properties that are not certified, and why, a line each (`doubts`).
     """
 
-    made: Prepared
+    prepared: Prepared
     measures: WellFormed
     followed: Followed
     flights: tuple[str, ...]
@@ -59,7 +59,7 @@ class PreparedFile(NamedTuple):
     @property
     def clip(self) -> Clip:
         """The prepared clip."""
-        return self.made.clip
+        return self.prepared.clip
 
     def __str__(self) -> str:
         return "\n".join(summary(self))
@@ -68,19 +68,19 @@ class PreparedFile(NamedTuple):
         """What makes the clip unusable, then what can be seen, then how far it is from the capture, a line each."""
         return (
             *self.followed.faults(self.measures.flights > 0),
-            *infeasible(self.made),
+            *infeasible(self.prepared),
             *self.measures.faults(),
             *self.flights,
-            *self.made.fidelity.faults(),
+            *self.prepared.fidelity.faults(),
         )
 
     def advice(self) -> tuple[str, ...]:
         """What the clip lacks of the capture, and what may help if the figure does not stand with it, a line each."""
-        if self.made.near and self.followed.stands:
-            return losses(self.made)
-        whole = "" if self.made.looped.kind == "open" else "--loop open if it does not repeat, "
+        if self.prepared.near and self.followed.stands:
+            return losses(self.prepared)
+        whole = "" if self.prepared.looped.kind == "open" else "--loop open if it does not repeat, "
         return (
-            *losses(self.made),
+            *losses(self.prepared),
             f"try --loop START:END for a part without what is not feasible, {whole}"
             "or a capture whose support is feet and hands alone",
         )
@@ -88,14 +88,14 @@ class PreparedFile(NamedTuple):
 
 def summary(outcome: PreparedFile) -> tuple[str, ...]:
     """Lines for the terminal: what was done and whether the clip is well-formed; below, faults, doubts and advice."""
-    made, flights = outcome.made, outcome.flights
+    prepared, flights = outcome.prepared, outcome.flights
     if len(flights) > _MAX_NAMED + 1:
         flights = (*flights[:_MAX_NAMED], f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists")
     faults = outcome._replace(flights=flights).faults()
     return (
-        f"{made.clip.name}: {'; '.join(changes(made))}; "
+        f"{prepared.clip.name}: {'; '.join(changes(prepared))}; "
         f"contact leaves a residual of {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
-        f"{made.seconds:.0f} s of processor time; " + ("not well-formed" if faults else "well-formed"),
+        f"{prepared.seconds:.0f} s of processor time; " + ("not well-formed" if faults else "well-formed"),
         *(f"  {line}" for line in (*faults, *outcome.doubts, *outcome.advice())),
     )
 
@@ -113,10 +113,10 @@ def doubts(found: ClipBallistics) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def changes(made: Prepared) -> tuple[str, ...]:
+def changes(prepared: Prepared) -> tuple[str, ...]:
     """Changes made to the capture, a line each."""
-    part, pace, change = made.looped, made.paced, made.feasible
-    after = " after the frames that are left out" if made.report and made.report.dropped else ""
+    part, pace, change = prepared.looped, prepared.paced, prepared.feasible
+    after = " after the frames that are left out" if prepared.report and prepared.report.dropped else ""
     when = f"{part.start:.2f} to {part.end:.2f} s{after}"
     words = {
         "cycle": f"cycle {when}, whose ends were {np.rad2deg(part.gap):.1f}° apart",
@@ -124,44 +124,44 @@ def changes(made: Prepared) -> tuple[str, ...]:
         "way back": "the whole motion, and back",
         "open": "the whole motion, at rest at both ends",
     }
-    lines = [f"{words[part.kind]}: {made.clip.duration:.2f} s"]
-    own_fraction = (part.end - max(part.start, 0.0)) / made.clip.duration
+    lines = [f"{words[part.kind]}: {prepared.clip.duration:.2f} s"]
+    own_fraction = (part.end - max(part.start, 0.0)) / prepared.clip.duration
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
-        what = f"of {made.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
+        what = f"of {prepared.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"
         lines.append(f"{what}; the rest is {_ADDED_MOTION[part.kind]}, which is not in the file")
     if pace.pace != 1.0:
         lines.append(f"played {pace.pace:.2f} times as fast, since its flights fall at {pace.falls:.1f} m/s²")
-    if made.root_shift > _MIN_ROOT_SHIFT:
-        lines.append(f"moved over the floor by up to {100 * made.root_shift:.0f} cm, since a loaded foot slides")
-    if not made.near:
+    if prepared.root_shift > _MIN_ROOT_SHIFT:
+        lines.append(f"moved over the floor by up to {100 * prepared.root_shift:.0f} cm, since a loaded foot slides")
+    if not prepared.near:
         return (*lines, "dynamics and feet as captured")
-    if made.hands.seconds > 0.0:
+    if prepared.hands.seconds > 0.0:
         lines.append(
-            f"hands are loaded for {made.hands.seconds:.2f} s, at points up to {100 * made.hands.moved:.0f} cm from "
-            "where their palms were captured"
+            f"hands are loaded for {prepared.hands.seconds:.2f} s, at points up to "
+            f"{100 * prepared.hands.moved:.0f} cm from where their palms were captured"
         )
     lines.append(
         f"dynamics moved joints {np.rad2deg(change.turned):.1f}°, the root {100 * change.raised:.1f} cm in height and "
-        f"{100 * change.moved:.1f} cm over the floor RMS; " + made.fidelity.line()
+        f"{100 * change.moved:.1f} cm over the floor RMS; " + prepared.fidelity.line()
     )
     return tuple(lines)
 
 
-def gaps(made: Prepared) -> tuple[str, str]:
+def gaps(prepared: Prepared) -> tuple[str, str]:
     """Distance d (`laps`) between the ends of the loop, in the capture and in the clip, in words."""
-    part, last = made.looped, made.clip.n_frames - 1
+    part, last = prepared.looped, prepared.clip.n_frames - 1
     if part.kind == "open":
         return "no loop", "no loop: at rest at both ends"
-    gap = float(frame_distances(made.clip, np.array([0, last]))[0][0, 1])
+    gap = float(frame_distances(prepared.clip, np.array([0, last]))[0][0, 1])
     mirror = " mirrored" if part.kind == "half stride" else ""
     was = f"ends {np.rad2deg(part.gap):.1f}° apart{mirror}" if np.isfinite(part.gap) else "as stated"
     return f"{was}, {max(part.start, 0.0):.2f} to {part.end:.2f} s", f"ends {np.rad2deg(gap):.1f}° apart"
 
 
-def infeasible(made: Prepared) -> tuple[str, ...]:
+def infeasible(prepared: Prepared) -> tuple[str, ...]:
     """How far the nearest feasible motion that was found is from the capture, if none is near."""
-    change = made.feasible
-    if made.near:
+    change = prepared.feasible
+    if prepared.near:
         return ()
     excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
     residual = f"{100 * change.residual:.0f} % of weight"
@@ -175,9 +175,9 @@ def infeasible(made: Prepared) -> tuple[str, ...]:
     )
 
 
-def losses(made: Prepared) -> tuple[str, ...]:
+def losses(prepared: Prepared) -> tuple[str, ...]:
     """What of the capture the clip lacks, or has at another pace, and how to keep it, a line each."""
-    part, falls = made.looped, made.paced.falls
+    part, falls = prepared.looped, prepared.paced.falls
     lines: list[str] = []
     seconds, since = part.left_out
     if seconds > _MIN_LEFT_OUT:
@@ -186,8 +186,8 @@ def losses(made: Prepared) -> tuple[str, ...]:
     turn, repeated = (round(float(np.rad2deg(angle))) for angle in part.turns)
     if abs(turn - repeated) > _MAX_LOST_TURN:
         lines.append(f"the capture turns by {turn}°, at the cycle's rate by {repeated}°: --loop open keeps its turns")
-    if made.paced.pace == 1.0 and not made.hands.seconds and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
-        rate = made.captured.fps * float(np.sqrt(GRAVITY / falls))
+    if prepared.paced.pace == 1.0 and not prepared.hands.seconds and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
+        rate = prepared.captured.fps * float(np.sqrt(GRAVITY / falls))
         lines.append(
             f"its flights fall at {two_digits(falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
             "if they are jumps, give --frame-rate"

@@ -110,20 +110,20 @@ def source_of(path: Path, captured: Clip, report: RetargetReport) -> Source:
     return Source(directions, _joint_places(middle, scales[:, None] * vectors), middle)
 
 
-def deviations(path: Path, made: Prepared) -> tuple[Deviation, Deviation] | None:
+def deviations(path: Path, prepared: Prepared) -> tuple[Deviation, Deviation] | None:
     """Deviation of a capture as retargeted and as prepared from its file; None for files on the figure's skeleton."""
-    if made.report is None:
+    if prepared.report is None:
         return None
-    captured, pace = made.captured, made.paced.pace
-    source = source_of(path, captured, made.report)
+    captured, pace = prepared.captured, prepared.paced.pace
+    source = source_of(path, captured, prepared.report)
     seconds = np.arange(captured.n_frames) / (captured.fps * pace)
-    clip_frames, capture_frames = common_frames(made.clip, captured, made.looped, pace)
-    rate, last = made.clip.fps, capture_frames.stop - 1
+    clip_frames, capture_frames = common_frames(prepared.clip, captured, prepared.looped, pace)
+    rate, last = prepared.clip.fps, capture_frames.stop - 1
     compared_frames = (capture_frames.start <= seconds * rate + 1e-6) & (seconds * rate <= last + 1e-6)
     times = seconds[compared_frames] + (clip_frames.start - capture_frames.start) / rate
-    poses = CubicSpline(np.arange(made.clip.n_frames) / rate, made.clip.poses)(times)
+    poses = CubicSpline(np.arange(prepared.clip.n_frames) / rate, prepared.clip.poses)(times)
     compared = Source(*(part[compared_frames] for part in source))
-    return deviation(source, captured.poses), deviation(compared, Clip(poses, rate, made.clip.name).poses)
+    return deviation(source, captured.poses), deviation(compared, Clip(poses, rate, prepared.clip.name).poses)
 
 
 def deviation(source: Source, poses: Array) -> Deviation:
@@ -148,8 +148,8 @@ def _rotation_up(up: str) -> Array:
 
 def _best_heading(own: Array, others: Array) -> Array:
     """Rotation about the vertical that turns vectors of shape (n, k, 3) as nearly as possible into others."""
-    flat, theirs = own @ (1, 1j, 0), others @ (1, 1j, 0)
-    return quaternions.about_axis(2, np.array(np.angle(np.nansum(theirs.conj() * flat))))
+    own_level, others_level = own @ (1, 1j, 0), others @ (1, 1j, 0)
+    return quaternions.about_axis(2, np.array(np.angle(np.nansum(others_level.conj() * own_level))))
 
 
 def _figure_lines(poses: Array) -> tuple[Array, Array, Array]:

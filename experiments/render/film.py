@@ -218,9 +218,9 @@ def render(folder: Path, target: Path, film: Film, gif: bool = False, overwrite:
             film_file.add(picture)
             if gif_file and row % 2 == 0:
                 gif_file.add(halved(picture))
-        complete = recording.complete
-    if not complete:
-        console.print(f"The run was cut short: the film shows the {frames.moments.t[-1]:.1f} s that are recorded.")
+        if not recording.complete:
+            recorded = float(recording.channel("ticks", "t")[-1])
+            console.print(f"The run was cut short after {recorded:.1f} s.")
     console.print(f"Written to {', '.join(str(file) for file in targets)}.", highlight=False, soft_wrap=True)
     clearance = {"ghost" if prefix == GHOST else "figure": low for prefix, low in frames.stage.clearance.items()}
     return FilmResult(tuple(map(str, targets)), len(frames), clearance)

@@ -109,9 +109,11 @@ def _ghost_poses(recording: Recording, folder: Path, frames: IntArray, requested
 def _averaged_heading(q: Array, fps: float) -> Array:
     """Averaged heading of root rotations (n, 4) [degrees]; the initial one if it turns too fast for the camera."""
     headings = np.unwrap(heading(q))
+    if len(headings) < 2:
+        return np.rad2deg(headings)
     window = int(TURN_SECONDS * fps) | 1
-    padded = np.pad(headings, window // 2, mode="reflect", reflect_type="odd") if len(headings) > 1 else headings
-    averaged = np.convolve(padded, np.full(window, 1.0 / window), mode="valid") if len(headings) > 1 else headings
-    if len(averaged) > 1 and np.rad2deg(np.max(np.abs(np.diff(averaged)))) * fps > FASTEST_TURN:
+    padded = np.pad(headings, window // 2, mode="reflect", reflect_type="odd")
+    averaged = np.convolve(padded, np.full(window, 1.0 / window), mode="valid")
+    if np.rad2deg(np.max(np.abs(np.diff(averaged)))) * fps > FASTEST_TURN:
         averaged = np.full(len(averaged), headings[0])
     return np.rad2deg(averaged)

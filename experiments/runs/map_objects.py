@@ -12,6 +12,8 @@ from mujoco import MjModel
 from controllers.checks import check_field_types
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
+from controllers.fields.algebra.law import Law
+from controllers.fields.follow import Follow
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted as LiftedMap
@@ -37,8 +39,8 @@ from sim.world.world import World
 class BodyMap(Protocol):
     """Factory of a haptic map for the body of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         ...
 
 
@@ -48,8 +50,8 @@ class _AboutCurve:
 
     most: ClassVar[int]
     """Number of clips that the map takes."""
-    made: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place], ClipMapParts]]
-    """Makes the map's parts for a figure."""
+    make_parts: ClassVar[Callable[[tuple[Clip, ...], MjModel, Place, bool], ClipMapParts]]
+    """Makes the map's parts for a figure, and for a field with a parallel flow or without."""
 
     clips: Sequence[Clip]
     around: Trajectory = field(repr=False)
@@ -67,9 +69,11 @@ class _AboutCurve:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
-        return for_size_of(world.body, lambda model: self.made(tuple(self.clips), model, self._place()))
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
+        parallel = any(isinstance(law, Follow) and law.parallel for law in field.program().laws)
+        clips, place = tuple(self.clips), self._place()
+        return for_size_of(world.body, lambda model: self.make_parts(clips, model, place, parallel))
 
     def _place(self) -> Place:
         curve = check_reach(self.around)
@@ -100,7 +104,7 @@ class Cylindrical(_AboutCurve):
         If the Phantom does not reach the curve.
     """
 
-    most, made = CORNERS, staticmethod(cylindrical_parts)
+    most, make_parts = CORNERS, staticmethod(cylindrical_parts)
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,7 +124,7 @@ class Composite(_AboutCurve):
         As `Cylindrical`, of three clips.
     """
 
-    most, made = PARTS, staticmethod(composite_parts)
+    most, make_parts = PARTS, staticmethod(composite_parts)
 
 
 @dataclass(frozen=True)
@@ -162,8 +166,8 @@ class Lifted:
     @property
     def around(self) -> Trajectory:
         """The curve on which the run begins, timed by its clip: φ of a field that plays it."""
-        made, _ = self._map_and_clips
-        return made.curve(curve_number(made, self.curve))
+        haptic_map, _ = self._map_and_clips
+        return haptic_map.curve(curve_number(haptic_map, self.curve))
 
     @property
     def clips(self) -> tuple[Clip, ...]:
@@ -172,13 +176,13 @@ class Lifted:
 
     @cached_property
     def _map_and_clips(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
-        made, clips = load_figure_map(Path(self.file))
-        if not isinstance(made, LiftedMap):
-            raise SimError(f"{self.file}: its map is {type(made).__name__}; expected one that hvf.lift wrote")
-        return made, clips
+        haptic_map, clips = load_figure_map(Path(self.file))
+        if not isinstance(haptic_map, LiftedMap):
+            raise SimError(f"{self.file}: its map is {type(haptic_map).__name__}; expected one that hvf.lift wrote")
+        return haptic_map, clips
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
         return for_size_of(world.body, lambda _: lifted_parts(*self._map_and_clips, part))
 
@@ -219,8 +223,8 @@ class RobotArm:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World) -> ClipMapParts:
-        """What the map gives a run."""
+    def parts(self, world: World, field: Law) -> ClipMapParts:
+        """What the map gives a run in a field."""
         return arm_parts(world.body, self.around, self.reach, self.scale)
 
 

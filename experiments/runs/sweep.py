@@ -90,8 +90,8 @@ def _run_combinations(
     if simulations and threads > 1:
         simulations[0].session(seconds)  # compiles the units once, before the threads begin
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for chosen, made in zip(combinations, pool.map(run, simulations), strict=True):
-            yield Swept(chosen, made)
+        for chosen, result in zip(combinations, pool.map(run, simulations), strict=True):
+            yield Swept(chosen, result)
 
 
 def with_values(sim: Simulation, chosen: Mapping[str, Any]) -> Simulation:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from controllers.fields.bunny import felt_bunny
 from experiments.config.maps import Led, MapFile
-from experiments.config.modes import Bunny, Follow, Lead, Rivers, Stretch, StretchThenFollow
+from experiments.config.modes import Bunny, Follow, Lead, Rivers, StretchThenFollow, StretchyTube
 from experiments.config.run_config import RunConfig
 from experiments.setups.parts.defaults import resolved, river_gains, tube_gains
 
@@ -41,7 +41,7 @@ def certified_laws(config: RunConfig) -> Laws:
             return {"": CertifiedLaw("follow", *river_gains(mode), mode.river_tube)}
         case Lead():
             return {"": CertifiedLaw("leading", mode.leash, mode.damping, _UNBOUNDED)}
-        case Stretch() | StretchThenFollow():  # tubes seek with the switch open, and hold with it closed
+        case StretchyTube():  # tubes seek with the switch open, and hold with it closed
             seek, damping = tube_gains(mode)
             laws = {
                 "": CertifiedLaw("seek", seek, damping, _UNBOUNDED),

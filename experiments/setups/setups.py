@@ -35,11 +35,11 @@ MODE_SETUPS: dict[str, Callable[..., Parts]] = {
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
 
-def _about_circle(made: Callable[..., ClipMapParts]) -> Callable[..., ClipMapParts]:
+def _about_circle(make_parts: Callable[..., ClipMapParts]) -> Callable[..., ClipMapParts]:
     def setup(
         config: RunConfig, part: Cylindrical | Composite, clips: tuple[Clip, ...], figure: MjModel
     ) -> ClipMapParts:
-        return made(clips, figure, place_of(part), flows_parallel(config))
+        return make_parts(clips, figure, place_of(part), flows_parallel(config))
 
     return setup
 
@@ -86,7 +86,7 @@ def parts_of(config: RunConfig, maps: MapParts[Any]) -> Parts:
     return MODE_SETUPS[config.mode.kind](config, config.mode, maps)
 
 
-def for_size_of(figure: MjModel, made: Callable[[MjModel], ClipMapParts]) -> ClipMapParts:
+def for_size_of(figure: MjModel, make_parts: Callable[[MjModel], ClipMapParts]) -> ClipMapParts:
     """Map parts of a figure of any stature: made for the default stature, which is that of the clips, and scaled.
 
     Lengths scaled by s at the same times scale accelerations by s, while gravity stays: a flight of the scaled motion
@@ -95,8 +95,8 @@ def for_size_of(figure: MjModel, made: Callable[[MjModel], ClipMapParts]) -> Cli
     """
     size = proportion(figure)
     if size == 1.0:
-        return made(figure)
-    parts = made(figure_model())
+        return make_parts(figure)
+    parts = make_parts(figure_model())
     flying = [clip.name for clip in parts.clips if longest_flight(clip) > 0.0]
     remark = (
         f"the flights of {', '.join(dict.fromkeys(flying))} last as they do at {DEFAULT_STATURE:g} m of stature; "

@@ -119,9 +119,9 @@ def crossing_figure() -> Figure:
     crossing_ax, passing_ax = figure.subplots(1, 2, sharey=True)
     crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 2 alone")
     columns = (("static sum", TUBE), ("smooth", FIELD), ("discrete", CURVE))
-    for (name, colour), here, way in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
+    for (name, colour), here, passing in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
         crossing_ax.plot(angles, [row[here] for row in rows], color=colour, label=name)
-        passing_ax.plot(angles, [row[way] for row in rows], color=colour)
+        passing_ax.plot(angles, [row[passing] for row in rows], color=colour)
     for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "largest while passing")):
         ax.set(xlabel="angle between the rivers [°]", xticks=range(0, 181, 30), title=title)
     crossing_ax.set(ylabel="force of river 2 [N]")

@@ -71,14 +71,14 @@ class LeadingTrial(Trial):
         c, s = (float(x) for x in self.regime.tangent(self.curve.velocity(self.phase)))
         plain = Walking(_GAIT, scale=SCALE, heading=float(np.arctan2(s, c)), rate=WALKER_RATE)
         lead = plain.lead[0]
-        laid = (plain.path()[0] - 1.0) * STEP - plain.ahead
+        path_end = (plain.path()[0] - 1.0) * STEP - plain.ahead
         edge = SCALE * EDGE_DISTANCE
         if not self.regime.beyond:
             along = -plain.backward * lead - edge if self.regime.ahead else -edge
             bend, across = plain.curvature, edge if self.regime.aside and self.regime.ahead else 0.0
         else:
             along = lead + edge if self.regime.ahead else lead - edge
-            beyond = along - laid
+            beyond = along - path_end
             bend = abs(self.regime.turn) / beyond if self.regime.turn else plain.curvature
             side = np.sign(self.regime.turn) if self.regime.turn else 1.0
             across = side * (0.5 * bend * beyond**2 + edge) if self.regime.aside else 0.0

@@ -28,20 +28,20 @@ TABLE_HEADER = (
 )
 
 
-def row(path: Path, made: Prepared) -> str:
+def row(path: Path, result: Prepared) -> str:
     """A line of the table."""
-    was, now = (well_formed(clip, clip_flights(clip)) for clip in (made.captured, made.clip))
-    before, after = followed(made.captured), followed(made.clip)
-    change, kept, seconds = made.feasible, made.fidelity, made.clip.duration
-    most, directions, places = kept.extremes[0], *_source_deviations(path, made)
-    motion_is_near = made.near and change.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
+    was, now = (well_formed(clip, clip_flights(clip)) for clip in (result.captured, result.clip))
+    before, after = followed(result.captured), followed(result.clip)
+    change, kept, seconds = result.feasible, result.fidelity, result.clip.duration
+    most, directions, places = kept.extremes[0], *_source_deviations(path, result)
+    motion_is_near = result.near and change.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
     why = "" if after.stands else "figure" if motion_is_near else "motion"
     cells = (
         _file_name(path),
         _half_name(path),
-        f"{made.looped.kind} {seconds:.2f} s" + (f", {made.paced.pace:.2f}×" if made.paced.pace != 1.0 else ""),
+        f"{result.looped.kind} {seconds:.2f} s" + (f", {result.paced.pace:.2f}×" if result.paced.pace != 1.0 else ""),
         f"{before}",
-        f"{after}" + ("" if made.near else " *"),
+        f"{after}" + ("" if result.near else " *"),
         why,
         f"{100 * change.residual:.1f}",
         directions,
@@ -56,7 +56,7 @@ def row(path: Path, made: Prepared) -> str:
         f"{100 * was.strain:.0f} → {100 * now.strain:.0f} {now.joint}",
         f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
         f"{most.joint} {np.rad2deg(most.angle):.0f}°",
-        f"{made.seconds:.1f}, {made.seconds / seconds:.1f}, {made.seconds / (seconds * after.cost):.0f}",
+        f"{result.seconds:.1f}, {result.seconds / seconds:.1f}, {result.seconds / (seconds * after.cost):.0f}",
     )
     return "| " + " | ".join(cells) + " |"
 
@@ -70,9 +70,9 @@ def _half_name(path: Path) -> str:
     return "tuning" if name in TUNING else "judging" if name in JUDGING else ""
 
 
-def _source_deviations(path: Path, made: Prepared) -> tuple[str, str]:
+def _source_deviations(path: Path, result: Prepared) -> tuple[str, str]:
     """Largest deviations of segments and joints from the file, as retargeted and as prepared."""
-    both = deviations(path, made)
+    both = deviations(path, result)
     if both is None:
         return "its own skeleton", "its own skeleton"
     was, now = both

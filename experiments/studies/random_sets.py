@@ -108,9 +108,9 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     timing = 0 if kind == "composite" else timing_clip(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
-    with TemporaryDirectory() as made:
+    with TemporaryDirectory() as scratch:
         if kind == "lifted":
-            file = Path(made) / "map.npz"
+            file = Path(scratch) / "map.npz"
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
@@ -174,13 +174,13 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     for kind in dict.fromkeys(row["map"] for row in rows):
         of = [row for row in rows if row["map"] == kind]
         held = f"{min(row['held'] for row in of):.0%}" if kind == "rivers" else "–"
-        stood = [row for row in of if row["fell"] is None]
-        low, high = proportion_confint(len(stood), len(of), method="wilson")
-        residual = 100 * np.array([row["residual"] for row in stood] or [np.nan])
+        upright = [row for row in of if row["fell"] is None]
+        low, high = proportion_confint(len(upright), len(of), method="wilson")
+        residual = 100 * np.array([row["residual"] for row in upright] or [np.nan])
         lowest, skate, beyond = (np.array([row[key] for row in of]) for key in ("lowest", "skate", "beyond"))
         lines.append(
             f"| {kind} | {len(of)}, {sum(bool(row['off_pace']) for row in of)} "
-            f"| {len(stood)}, {low:.0%} to {high:.0%} "
+            f"| {len(upright)}, {low:.0%} to {high:.0%} "
             f"| {np.median(residual):.1f}, {residual.max():.1f}; {np.sum(residual <= 12.0)} "
             f"| {lowest.min():.1f}; {np.sum(lowest > -1.0)} "
             f"| {np.median(skate):.1f}, {skate.max():.1f}; {np.sum(skate <= 2.0)} "

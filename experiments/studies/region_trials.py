@@ -110,8 +110,8 @@ def region_trials(out: Path = Path("runs/region_trials"), count: int = 1000, out
     most, ball = float(str(figures["largest_distance"])), float(str(figures["ball"]))
     for times, n in ((1.0, count), (1.5, outside), (3.0, outside), (6.0, outside)):
         outcomes = np.array([simulate_from(river, figures, times, rng) for _ in range(n)])
-        left, astray = int(np.sum(outcomes[:, 0] > times * most)), int(np.sum(outcomes[:, 1] > ball))
-        lines.append(f"| {times:g} | {n} | {left} | {astray} | {1e3 * outcomes[:, 0].max():.2f} |")
+        left, missed = int(np.sum(outcomes[:, 0] > times * most)), int(np.sum(outcomes[:, 1] > ball))
+        lines.append(f"| {times:g} | {n} | {left} | {missed} | {1e3 * outcomes[:, 0].max():.2f} |")
         print(lines[-1], flush=True)
     out.mkdir(parents=True, exist_ok=True)
     report = f"{verdict.reason}\n\n" + "\n".join(lines) + "\n"

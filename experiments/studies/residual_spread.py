@@ -49,8 +49,8 @@ def _run_command(words: Sequence[str], folder: Path, core: str) -> None:
 def main(cores: Sequence[str]) -> None:
     """Print the table."""
     page = README.read_text(encoding="utf-8")
-    with TemporaryDirectory() as made:
-        folders = {core: Path(made) / (core or "own") for core in cores or [""]}
+    with TemporaryDirectory() as scratch:
+        folders = {core: Path(scratch) / (core or "own") for core in cores or [""]}
         for core, folder in folders.items():
             folder.mkdir()
             for line, _ in _ROW.findall(page):

@@ -92,7 +92,7 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
 
     while data.time < _SETTLING_TIME:
         push(-_centre_of_mass(data.qpos), -_centre_of_mass(data.qvel), np.zeros(3))
-    data.time, stood, began = 0.0, data.qpos[:2].copy(), _centre_of_mass(data.qpos)
+    data.time, start, began = 0.0, data.qpos[:2].copy(), _centre_of_mass(data.qpos)
     # The mass alone is set in motion, by as much as the centre of both needs.
     data.qvel[3:] += (velocity - _centre_of_mass(data.qvel)) / _centre_of_mass(np.repeat([0.0, 1.0], 3))
     miss, slid = 0.0, 0.0
@@ -101,7 +101,7 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
             t = data.time
             push(began + spline(t) - _centre_of_mass(data.qpos), speed(t) - _centre_of_mass(data.qvel), acceleration(t))
         miss = max(miss, float(np.linalg.norm(began + way[k] - way[0] - _centre_of_mass(data.qpos))))
-        slid = max(slid, float(np.linalg.norm(data.qpos[:2] - stood)))
+        slid = max(slid, float(np.linalg.norm(data.qpos[:2] - start)))
     return Followed(miss, slid)
 
 

@@ -1,5 +1,6 @@
 """Evaluation of candidates by a panel of simulated users; every trial is run once and stored."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -57,13 +58,13 @@ class Panel:
         StudyError
             If no trial has one of the measures.
         """
-        keys = [[trial_key(run) for run in own] for own in runs]
-        run_by_key = {key: run for of, own in zip(keys, runs, strict=True) for key, run in zip(of, own, strict=True)}
+        keys = [[trial_key(run) for run in user_runs] for user_runs in runs]
+        run_by_key = dict(zip(itertools.chain(*keys), itertools.chain(*runs), strict=True))
         missing = [Task(key, to_json(run)) for key, run in run_by_key.items() if key not in self._rows]
         for row in self._executor.rows(missing) if missing else ():
             self._database.add(row, {})
             self._rows[row.key] = row
-        by_user = [[self._rows[key] for key in of] for of in keys]
+        by_user = [[self._rows[key] for key in user_keys] for user_keys in keys]
         values = np.array([[_mean_objective(rows, name, margin) for name in config.objectives] for rows in by_user])
         absent = [name for k, name in enumerate(config.objectives) if np.all(np.isnan(values[:, k]))]
         if absent:

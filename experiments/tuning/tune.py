@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
-from types import CodeType
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -13,6 +12,8 @@ import numpy as np
 from controllers.certificates.report import hash_of
 from controllers.checks import check_callable, check_field_types, check_kind, numbers_of
 from controllers.errors import ParameterError
+from controllers.fields.algebra.description import code_digest, described
+from controllers.haptic_map.base import HapticMap
 from experiments.certify.certify_simulation import certify
 from experiments.config.keywords import with_keyword_messages
 from experiments.files.given_path import given_path
@@ -141,7 +142,7 @@ def tune(
         with_values(sim, {path: bounds[edge] for path, bounds in space.items()})
     # A session in the middle of the space compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
-    study = _create_study(search, _study_name(sim, space, cost, len(users), seconds, search))
+    study = _create_study(search, _study_name(sim, space, cost, users, seconds, search))
     complete = (optuna.trial.TrialState.COMPLETE,)
     ranges = {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
     for number in range(len(study.trials), MAX_PROPOSALS_RATIO * search.candidates):
@@ -179,17 +180,18 @@ def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
 
 
 def _study_name(
-    sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: int, seconds: float, search: Search
-) -> str:
-    """Name of a search in its journal; it depends on simulation, space, cost and settings, so that none is mixed up."""
-    code = getattr(cost, "__code__", None)
-    cost_code = (
-        (code.co_code, code.co_names, [str(value) for value in code.co_consts if not isinstance(value, CodeType)])
-        if code
-        else type(cost).__qualname__
-    )
+    sim: Simulation, space: Mapping[str, tuple[float, float]], cost: Cost, users: Sequence[User], seconds: float,
+    search: Search,
+) -> str:  # fmt: skip
+    """Name of a search in its journal; it depends on all that a cost depends on, so that no two searches are mixed up.
+
+    Of a user-defined map only the name of its class counts.
+    """
+    given = sim.haptic_map
+    haptic_map = given if is_dataclass(given) and not isinstance(given, HapticMap) else type(given).__name__
+    parts = (sim.field, haptic_map, sim.device, sim.figure, sim.clock, sim.seed, sim.tank, tuple(users))
     settings = (search.sampler, search.seed, search.costs, search.allow_unknown)
-    return f"hvf.tune {hash_of((sim.description(), sorted(space.items()), cost_code, users, seconds, settings))}"
+    return f"hvf.tune {hash_of((described(parts), sorted(space.items()), code_digest(cost), seconds, settings))}"
 
 
 def _create_study(search: Search, name: str) -> Any:

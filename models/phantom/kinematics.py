@@ -133,6 +133,15 @@ def within_limits(theta: Vec3) -> bool:
 
 
 @njit
+def clamped_to_limits(theta: Vec3) -> Scalars3:
+    """Joint angles [rad] brought within the limits, the upper arm's before the forearm's."""
+    turret = min(max(theta[0], LIMIT[0][0]), LIMIT[0][1])
+    upper = min(max(theta[1], LIMIT[1][0], LIMIT[2][0] - ELBOW_LIMIT[1]), LIMIT[1][1], LIMIT[2][1] - ELBOW_LIMIT[0])
+    fore = min(max(theta[2], LIMIT[2][0], upper + ELBOW_LIMIT[0]), LIMIT[2][1], upper + ELBOW_LIMIT[1])
+    return turret, upper, fore
+
+
+@njit
 def inside_workspace(p_P: Vec3) -> bool:
     """Whether the gimbal centre can be at a point of the device frame [m] with all joints within their limits."""
     theta1, theta2, theta3, reachable = inverse_kinematics(p_P)

@@ -73,7 +73,6 @@ def shared_forces(edges: Array, share: Array, wrench: Array, residual: Array, fo
     """
     n = share.size
     H, step, gradient, trial = work_array((6, 6)), work_array(6), work_array(6), work_array(6)
-    slope = 0.0
     for taken in range(_MAX_NEWTON_STEPS):
         value = _differentiate_dual(edges, share, wrench, residual, force, H, step)
         norm = 0.0

@@ -213,14 +213,10 @@ def _describe_global(function: Function, chain: tuple[str, ...], callees: _Calle
     value = function.__globals__[chain[0]]
     for attribute in chain[1:]:
         # Only attributes of modules and enumerations are followed; any other value is described as a whole.
-        if not isinstance(value, python_types.ModuleType) and not _is_enumeration(value):
+        if not isinstance(value, python_types.ModuleType | enum.EnumType):
             break
         value = getattr(value, attribute)
     return _describe_value(value, name, callees)
-
-
-def _is_enumeration(value: object) -> bool:
-    return isinstance(value, type) and issubclass(value, enum.Enum)
 
 
 def _describe_value(value: Any, name: str, callees: _Callees) -> object:  # noqa: C901 - a kind of value a branch

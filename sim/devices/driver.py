@@ -85,14 +85,14 @@ def make_telemetry() -> Array:
 
 
 @njit
-def note_arrival(telemetry: Array, clocks: Array, now: float, made: float) -> None:
-    """Update jitter and staleness for a reading made at `made` by the device's clock, received at `now` [s].
+def note_arrival(telemetry: Array, clocks: Array, now: float, measured_at: float) -> None:
+    """Update jitter and staleness for a reading made at `measured_at` by the device's clock, received at `now` [s].
 
     The two clocks have different origins and drift, so only changes of their difference are used, and the least
     difference rises at the rate of `MAX_CLOCK_DRIFT`. `clocks` (3,) holds the last difference of the clocks (NaN before
     the first reading of a device's clock), the least difference, and when the last reading came.
     """
-    delay = now - made
+    delay = now - measured_at
     if math.isnan(clocks[0]):
         clocks[1], telemetry[JITTER] = delay, 0.0
     else:

@@ -50,7 +50,8 @@ _CRC_WORD, _CRC_OFFSET = _OFFSETS[protocol.INPUT]["crc"] // 4, _OFFSETS[protocol
 _OUT_BOOT, _OUT_SEQUENCE = _OFFSETS[protocol.OUTPUT]["boot"] // 2, _OFFSETS[protocol.OUTPUT]["sequence"] // 4
 _OUT_WATCHDOG, _OUT_TORQUE = _OFFSETS[protocol.OUTPUT]["watchdog_us"] // 4, _OFFSETS[protocol.OUTPUT]["torque"] // 4
 _OUT_ANSWERS = _OFFSETS[protocol.OUTPUT]["answers"] // 4
-_SIZE, _INPUT, _OUTPUT, _ENABLE, _SWITCH = protocol.REPORT_SIZE, protocol.INPUT, protocol.OUTPUT, 1, protocol.SWITCH
+_SIZE, _INPUT, _OUTPUT = protocol.REPORT_SIZE, protocol.INPUT, protocol.OUTPUT
+_ENABLE, _SWITCH = protocol.ENABLE, protocol.SWITCH
 _STATUS_WATCHDOG, _STATUS_HOT, _STATUS_ENABLED = protocol.STATUS_WATCHDOG, protocol.STATUS_HOT, protocol.STATUS_ENABLED
 _NO_CELSIUS = protocol.NO_TEMPERATURE
 _CELSIUS_UNIT, _TORQUE_UNIT = protocol.TEMPERATURE_UNIT, protocol.TORQUE_UNIT
@@ -182,19 +183,19 @@ def judge_report(hid: HidMemory) -> None:
         numbers[N_REENABLE] = 1 if status & _STATUS_WATCHDOG else 0
     if not _is_next(hid, np.int64(words.u32[_SEQUENCE])):
         return
-    made = np.int64(words.u64[_TIME]) * 1e-6
+    measured_at = np.int64(words.u64[_TIME]) * 1e-6
     for i in range(6):
         hid.reading[READING_THETA + i] = (np.int64(words.i32[_ENCODER + i]) - hid.zero[i]) * hid.angle[i]
     hid.reading[READING_SWITCH] = words.u8[1] & _SWITCH
-    hid.reading[READING_CLOCK] = made
+    hid.reading[READING_CLOCK] = measured_at
     numbers[N_TAKEN] += 1
     hid.reading[READING_SEQUENCE] = numbers[N_TAKEN]
-    _update_telemetry(hid, made, answered)
+    _update_telemetry(hid, measured_at, answered)
     _judge_temperature(hid, status)
     if status & _STATUS_ERRORS:
         _set_fault(io, _DEVICE_REPORTED, float(status & _STATUS_ERRORS))
     if io[IO_FAULT] == 0.0:
-        _judge_motors(hid, made, answered, status)
+        _judge_motors(hid, measured_at, answered, status)
     io[IO_NEW] = 1.0 if io[IO_FAULT] == 0.0 else 0.0
 
 
@@ -221,7 +222,7 @@ def _is_next(hid: HidMemory, number: np.int64) -> bool:
 
 
 @njit
-def _update_telemetry(hid: HidMemory, made: float, answered: np.int64) -> None:
+def _update_telemetry(hid: HidMemory, measured_at: float, answered: np.int64) -> None:
     """Update the telemetry: temperatures, round trip, jitter and staleness."""
     telemetry, now = hid.telemetry, hid.io[IO_NOW]
     for i in range(3):
@@ -230,7 +231,7 @@ def _update_telemetry(hid: HidMemory, made: float, answered: np.int64) -> None:
     if 0 <= _sequence_difference(hid.numbers[N_SENT], answered) < _SEND_TIME_COUNT:
         held = np.int64(hid.incoming.u32[_HELD_TIME])
         telemetry[ROUND_TRIP] = now - hid.sent_at[answered % _SEND_TIME_COUNT] - held * 1e-6
-    note_arrival(telemetry, hid.clocks, now, made)
+    note_arrival(telemetry, hid.clocks, now, measured_at)
 
 
 @njit
@@ -245,7 +246,7 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
 
 
 @njit
-def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.int64) -> None:
+def _judge_motors(hid: HidMemory, measured_at: float, answered: np.int64, status: np.int64) -> None:
     """Check motors that are off although they were commanded on.
 
     Either the firmware's watchdog switched them off: after a gap in the readings they may be switched on again, since
@@ -257,12 +258,12 @@ def _judge_motors(hid: HidMemory, made: float, answered: np.int64, status: np.in
     if enable_command < 0 or status & _STATUS_ENABLED:
         return
     if status & _STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
-        if made - io[IO_READING_TIME] > 0.5 * WATCHDOG_TIME:
+        if measured_at - io[IO_READING_TIME] > 0.5 * WATCHDOG_TIME:
             hid.numbers[N_REENABLE] = 1
         else:
             _set_fault(io, _DEVICE_REPORTED, _STATUS_WATCHDOG)
         return
-    waited = min(io[IO_NOW] - io[IO_ENABLE_TIME], made - io[IO_ENABLE_DEVICE_TIME])
+    waited = min(io[IO_NOW] - io[IO_ENABLE_TIME], measured_at - io[IO_ENABLE_DEVICE_TIME])
     if waited > WATCHDOG_TIME:
         _set_fault(io, _MOTORS_OFF, waited)
 

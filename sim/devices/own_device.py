@@ -247,9 +247,9 @@ def open_own_device(name: str) -> TipDriver:
     SimError
         As `own_device_class`, or if the class cannot be made.
     """
-    made = own_device_class(name)
+    device_class = own_device_class(name)
     try:
-        device = made()
+        device = device_class()
     except (Exception, SystemExit) as error:
         raise SimError(f"{name} does not open: {_error_words(error)}") from None
     return TipDriver(device, name)

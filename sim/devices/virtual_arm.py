@@ -21,6 +21,7 @@ from models.phantom.kinematics import (
     Quat,
     Scalars3,
     Vec3,
+    clamped_to_limits,
     force_from_torques,
     forward_kinematics,
     gimbal_angles,
@@ -106,7 +107,7 @@ def place_stylus(reading: Array, p_P: Vec3, r_HS: Array) -> tuple[int, float]:
     a, b, c, reachable = inverse_kinematics(p_P)
     theta = (a, b, c)
     if not reachable or not within_limits(theta):
-        x, y, z = forward_kinematics(theta)
+        x, y, z = forward_kinematics(clamped_to_limits(theta))
         return _LEFT_WORKSPACE, math.sqrt((x - p_P[0]) ** 2 + (y - p_P[1]) ** 2 + (z - p_P[2]) ** 2)
     gimbal = gimbal_angles(theta, quaternion_of(r_HS))
     for i in range(3):

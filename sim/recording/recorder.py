@@ -11,8 +11,8 @@ import math
 import os
 import platform
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -194,7 +194,7 @@ class Recorder:
     RecordingError
         If the file exists.
     DiskFull
-        When rows are appended for which there is no room.
+        When rows are appended for which there is no room; the file is then closed.
     """
 
     def __init__(
@@ -218,7 +218,7 @@ class Recorder:
         access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
         flags = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
         self._file = h5py.File(h5py.h5f.open(os.fsencode(path), flags, access))
-        self._lock = lock_for_writing(path)
+        self._lock, self._closed = lock_for_writing(path), False
         self._streams = {name: _Stream(group, group_of(self._file, name), path) for name, group in groups.items()}
 
     def append(self, group: str, blocks: Mapping[str, Array]) -> None:
@@ -238,16 +238,18 @@ class Recorder:
         """
         if group not in self._streams:
             raise RecordingError(f"{group}: no such group; there are {sorted(self._streams)}")
-        self._streams[group].append(blocks)
+        with self._closed_if_disk_is_full():
+            self._streams[group].append(blocks)
 
     def flush(self) -> None:
         """Write what is buffered, so that a reader sees all that was appended."""
-        for stream in self._streams.values():
-            stream.flush()
+        with self._closed_if_disk_is_full():
+            for stream in self._streams.values():
+                stream.flush()
 
     def close(self, summary: Mapping[str, object] | None = None) -> None:
         """Write what is buffered and close the file; a summary marks the recording as complete."""
-        if not self._file:
+        if self._closed:
             return
         self.flush()
         if summary is not None:
@@ -257,6 +259,7 @@ class Recorder:
             dataset[:] = text
             dataset.flush()
             count[0] = len(text)
+        self._closed = True
         self._file.close()
         os.close(self._lock)
 
@@ -264,13 +267,16 @@ class Recorder:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        if isinstance(error, DiskFull):
-            self._close_unflushed()
-        else:
-            self.close()
+        self.close()
 
-    def _close_unflushed(self) -> None:
-        """Close the file without writing the buffers, as far as a full disk permits."""
-        with suppress(OSError, RuntimeError):
-            self._file.close()
-        os.close(self._lock)
+    @contextmanager
+    def _closed_if_disk_is_full(self) -> Generator[None]:
+        """Close the file without writing the buffers if the disk becomes full."""
+        try:
+            yield
+        except DiskFull:
+            self._closed = True
+            with suppress(OSError, RuntimeError):
+                self._file.close()
+            os.close(self._lock)
+            raise

@@ -101,7 +101,7 @@ def _place_on_pivot(reference: CompiledReference, params: Array) -> tuple[int, f
     if foot >= 0:
         limb_end(transition.limbs[foot], transition.shown[0], old)
         limb_end(transition.limbs[foot], transition.ahead[row], new)
-        turn = heading_between(new, old) if np.sum(transition.stands) == 1.0 else 0.0
+        turn = heading_between(new, old) if np.sum(transition.stance) == 1.0 else 0.0
         _place_clip(reference, new, old[0], old[1], turn)
         moved = math.hypot(new[0] - old[0], new[1] - old[1])
     return foot, moved

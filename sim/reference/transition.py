@@ -67,7 +67,7 @@ class Transition(NamedTuple):
         Scratch: the shown pose now, and one period before and after, shape (3, 75).
     ahead : Array
         Scratch: poses of the new motion at the end of the first step and of the second, shape (2, 75).
-    stands : Array
+    stance : Array
         Scratch: 1 for legs on which the new motion stands, shape (n,).
     offset, before, after : Array
         Scratch, shape (57,).
@@ -84,7 +84,7 @@ class Transition(NamedTuple):
     candidate_river: Array
     shown: Array
     ahead: Array
-    stands: Array
+    stance: Array
     offset: Array
     before: Array
     after: Array
@@ -97,7 +97,7 @@ def make_transition(nq: int, nv: int, seconds: float, limbs: Array) -> Transitio
         seconds=seconds, duration=np.full(1, seconds), since=np.full(1, np.inf), depth=np.zeros(1),
         change=np.zeros((3, nv)), limbs=limbs, steps=np.zeros((n, STEP)), ends=np.zeros((n, 7)),
         candidate_river=np.array([-1.0, 0.0]), shown=np.zeros((3, nq)),
-        ahead=np.zeros((2, nq)), stands=np.zeros(n), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
+        ahead=np.zeros((2, nq)), stance=np.zeros(n), offset=np.zeros(nv), before=np.zeros(nv), after=np.zeros(nv),
     )  # fmt: skip
 
 
@@ -113,7 +113,7 @@ def dwell_complete(transition: Transition, river: float, period: float) -> bool:
 @njit
 def pivot_of(transition: Transition) -> tuple[int, int]:
     """The leg in stance both before and after a change (−1: none), and the row of `ahead`; see `footsteps.pivot`."""
-    return pivot(transition.limbs, transition.shown[0], transition.ahead, transition.stands)
+    return pivot(transition.limbs, transition.shown[0], transition.ahead, transition.stance)
 
 
 @njit
@@ -202,5 +202,5 @@ def note_change(
     if transition.seconds > 0.0:
         plan_steps(
             transition.limbs, transition.steps, transition.shown, pose, period, transition.duration[0], second,
-            transition.stands,
+            transition.stance,
         )  # fmt: skip

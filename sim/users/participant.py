@@ -12,7 +12,7 @@ from sim.users.person.body import arm_matrices, check_steps
 from sim.users.person.eye import IMAGE_INTERVAL, no_eye
 from sim.users.person.person import Person
 from sim.users.person.person_state import PersonState
-from sim.users.person.random_numbers import fresh_chance
+from sim.users.person.random_numbers import initial_rng
 from sim.users.person.wishes import Wishes
 
 MAX_PERSON_PERIOD = 0.01  # [s] longest servo period at which a person is stepped: a third of the shortest reflex delay
@@ -71,7 +71,7 @@ class Participant:
             memory=np.zeros(at.N_MEMORY), vectors=np.zeros((at.N_VECTORS, 3)),
             inertia=inertia, mobility=np.linalg.inv(inertia).astype(np.float64), stiffness=stiffness, damping=damping,
             wishes=self.wishes.rows.copy(), past=np.zeros((max(reflex, seen) + 1, at.PAST_SIZE)),
-            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), chance=fresh_chance(self.seed),
+            plans=np.zeros((2, 6, 3)), learned=np.zeros((at.LEARNED_PARTS, 3)), rng=initial_rng(self.seed),
             eye=no_eye(),
         )  # fmt: skip
 

@@ -35,10 +35,10 @@ class HandBall:
         self._offset = np.zeros(3)
         self.dragged = False
 
-    def on_drag(self, told: Dragged) -> None:
+    def on_drag(self, callback: Dragged) -> None:
         """Set the callback of drags with the left button, without and with shift."""
         for modifier in (None, "shift"):
-            self._ball.on_drag("left", modifier=modifier)(self._listener(told, modifier is not None))
+            self._ball.on_drag("left", modifier=modifier)(self._listener(callback, modifier is not None))
 
     def rest(self, p_H: Array) -> None:
         """Put the ball at a point of the hand frame [m], shape (3,)."""

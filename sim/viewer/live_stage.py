@@ -5,7 +5,6 @@ figures, with axes parallel to the world's. A travelling figure is followed: the
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -14,9 +13,10 @@ import viser
 from geometry.arrays import Array
 from models.world.scene import P_WH
 from sim.viewer.actor import GHOST, Actor
+from sim.viewer.drawn_curve import DrawnCurve
 from sim.viewer.framing import MAX_TRAVEL
 from sim.viewer.palette import FIELD, USER, rgb
-from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, simplify_shapes, tube
+from sim.viewer.shapes import body_prefix, body_shapes, drawn_radius, simplify_shapes
 from sim.viewer.shown import Course, Moment
 
 MAGNIFICATION = 8.0  # drawn over true lengths of the device
@@ -81,10 +81,11 @@ class LiveStage:
         self._lag_line = scene.add_line_segments(
             "/lag", np.zeros((1, 2, 3)), rgb(USER), thickness=3.0, thickness_units="screen", visible=False
         )
-        self._tubes: dict[str, viser.MeshHandle] = {}
-        self._courses = [(course, self._drawn_radius(course, radius)) for course in drawn]
-        for k in range(len(self._courses)):
-            self.draw_course(k, self._courses[k][0].points)
+        self._curves: list[DrawnCurve] = []
+        for k, course in enumerate(drawn):
+            tube = MAGNIFICATION * drawn_radius(course.points, radius)
+            self._curves.append(DrawnCurve(scene, f"/curve/{k}", course, 0.006, tube))
+            self.draw_course(k, course.points)
         self._label("phantom", f"Phantom, {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([-0.25, 0.0, 0.85]))
         if shapes:
             self._label("figure", figure, np.array([0.0, 0.0, 2.0]))
@@ -104,20 +105,7 @@ class LiveStage:
 
     def draw_course(self, k: int, points: Array) -> None:
         """Draw curve k at its current points in the hand frame [m], shape (m, 3)."""
-        course, radius = self._courses[k]
-        line = drawn_at(points)
-        self._draw_tube(f"/curve/{k}/line", line, 0.006, 8, {"color": rgb(course.line), "cast_shadow": False})
-        if radius > 0.0:
-            style = {"color": rgb(course.tube), "opacity": 0.14, "side": "double", "receive_shadow": False}
-            self._draw_tube(f"/curve/{k}/tube", line, MAGNIFICATION * radius, 20, style | {"cast_shadow": False})
-
-    def _draw_tube(self, node: str, line: Array, radius: float, sides: int, style: dict[str, Any]) -> None:
-        vertices, faces = tube(line, radius, sides)
-        mesh = self._tubes.get(node)
-        if mesh is not None and len(mesh.vertices) == len(vertices):
-            mesh.vertices = vertices.astype(np.float32)
-        else:
-            self._tubes[node] = self._scene.add_mesh_simple(node, vertices, faces, **style)
+        self._curves[k].draw(drawn_at(points))
 
     def draw_slice(self, points: Array, forces: Array) -> None:
         """Draw the field's forces [N] at points of the hand frame [m], shapes (n, 3); with no points, hide them."""
@@ -176,10 +164,6 @@ class LiveStage:
         return self._scene.add_label(
             f"/labels/{name}", text, position=position, anchor="bottom-center", font_screen_scale=1.1
         )
-
-    @staticmethod
-    def _drawn_radius(course: Course, radius: float) -> float:
-        return min(radius, TUBE_SHARE * float(np.max(np.ptp(course.points, axis=0))))
 
 
 def light(scene: viser.SceneApi, shadows: bool = True) -> None:

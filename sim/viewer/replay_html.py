@@ -17,10 +17,11 @@ from geometry.arrays import Array
 from models.world.scene import FIGURE, ROBOT
 from sim.recording.recording import Recording
 from sim.viewer.actor import GHOST, Actor
+from sim.viewer.drawn_curve import DrawnCurve
 from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER, rgb
-from sim.viewer.shapes import TUBE_SHARE, body_prefix, body_shapes, tube
-from sim.viewer.shown import Course, courses
+from sim.viewer.shapes import body_prefix, body_shapes, distinct, drawn_radius, tube
+from sim.viewer.shown import courses
 
 FPS = 30.0  # [1/s]
 MAX_SECONDS = 60.0  # [s] longest replay; of a longer run only the beginning is shown
@@ -73,9 +74,8 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
 
 
 def drawn_tube(recording: Recording) -> float:
-    """Drawn radius of the tube [m]: the recorded radius, limited so that it does not hide the curve and the hand."""
-    extent = float(np.max(np.ptp(recording.arrays["curve"], axis=0)))
-    return min(float(recording.arrays["tube_radius"]), TUBE_SHARE * extent)
+    """`drawn_radius` of a recording's tube [m]."""
+    return drawn_radius(recording.arrays["curve"], float(recording.arrays["tube_radius"]))
 
 
 class _Stage:
@@ -109,7 +109,8 @@ class _Stage:
             "/floor", infinite_grid=True, cell_size=0.25, section_size=1.0, fade_distance=12.0, shadow_opacity=0.25
         )
         for k, course in enumerate(courses(recording.static)):
-            self._draw_course(f"/curve/{k}", course, drawn_tube(recording))
+            drawn = DrawnCurve(scene, f"/curve/{k}", course, 0.004, MAGNIFICATION * drawn_tube(recording))
+            drawn.draw(PHANTOM_AT + MAGNIFICATION * course.points)
         self._label(
             "phantom", f"Phantom, drawn {MAGNIFICATION:g} times larger", PHANTOM_AT + np.array([0.86, 0.0, 1.1])
         )
@@ -128,18 +129,6 @@ class _Stage:
         return self._scene.add_arrows(
             f"/forces/{name}", np.zeros((1, 2, 3)), rgb(color), shaft_radius=0.015, head_radius=0.035, head_length=0.07
         )
-
-    def _draw_course(self, node: str, course: Course, radius: float) -> None:
-        line = PHANTOM_AT + MAGNIFICATION * course.points
-        vertices, faces = tube(line, 0.004, sides=8)
-        self._scene.add_mesh_simple(f"{node}/line", vertices, faces, color=rgb(course.line), cast_shadow=False)
-        if radius == 0.0:
-            return
-        vertices, faces = tube(line, MAGNIFICATION * radius)
-        self._scene.add_mesh_simple(
-            f"{node}/tube", vertices, faces, color=rgb(course.tube), opacity=0.16, side="double", cast_shadow=False,
-            receive_shadow=False,
-        )  # fmt: skip
 
     def play(self, server: viser.ViserServer) -> str:
         """Run through the recording and return the page."""
@@ -181,11 +170,10 @@ class _Stage:
 
     def _extend_trail(self, index: int, start: int, stop: int) -> None:
         step = max(1, (stop - start) // 12)
-        points = PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step]
-        is_distinct = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1] - 1.0), axis=1) > 1e-4
-        if np.count_nonzero(is_distinct) < 2:
+        points = distinct(PHANTOM_AT + MAGNIFICATION * self._ticks["p"][start : stop + 1 : step])
+        if len(points) < 2:
             return
         is_pushed = np.max(np.linalg.norm(self._ticks["user"][start : stop + 1 : step], axis=1)) > MIN_PUSH_FORCE
-        vertices, faces = tube(points[is_distinct], 0.007, sides=8)
+        vertices, faces = tube(points, 0.007, sides=8)
         color = rgb(USER if is_pushed else FIELD)
         self._scene.add_mesh_simple(f"/trail/{index}", vertices, faces, color=color, cast_shadow=False)

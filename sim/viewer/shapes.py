@@ -10,9 +10,12 @@ from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
 from geometry.arrays import Array, IntArray
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
 
-TUBE_SHARE = 0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
+_MAX_TUBE_SHARE = (
+    0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
+)
 
 _MIN_STEP = 1e-12  # [m] shortest step between two points that has a direction
+_MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path
 _MIN_NORMAL = 1e-6  # shortest projection of a unit normal that is still used
 
 
@@ -131,6 +134,16 @@ def tube(points: Array, radius: float, sides: int = 20) -> tuple[Array, IntArray
     c, d = first[1:], np.roll(first, -1, axis=1)[1:]
     faces = np.concatenate([np.stack([a, b, d], axis=-1).reshape(-1, 3), np.stack([a, d, c], axis=-1).reshape(-1, 3)])
     return rings.reshape(-1, 3), faces
+
+
+def distinct(path: Array) -> Array:
+    """The points of a path (n, 3) that are 0.1 mm or more from the one before: tubes through others twist."""
+    return path[np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _MIN_POINT_DISTANCE]
+
+
+def drawn_radius(points: Array, radius: float) -> float:
+    """Radius with which a tube of a radius [m] around points (n, 3) of a curve is drawn [m]: limited by the extent."""
+    return min(radius, _MAX_TUBE_SHARE * float(np.max(np.ptp(points, axis=0))))
 
 
 def _directions(tangents: Array) -> Array:

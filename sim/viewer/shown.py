@@ -1,4 +1,4 @@
-"""What is displayed of a run: its curves, and a moment of it; time kept in step with the clock of who watches."""
+"""What is displayed of a run: its curves, and a moment of it; time kept in step with the wall clock."""
 
 import time
 from collections.abc import Mapping

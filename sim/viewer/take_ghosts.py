@@ -10,10 +10,9 @@ from geometry.arrays import Array
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT, GHOST_CELL, drawn_at
 from sim.viewer.palette import RIVERS, rgb
-from sim.viewer.shapes import body_shapes, simplify_shapes, tube
+from sim.viewer.shapes import body_shapes, distinct, simplify_shapes, tube
 
 COLORS = RIVERS[1:]
-_MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path
 
 
 class TakeGhosts:
@@ -37,9 +36,8 @@ class TakeGhosts:
         self._paths: list[viser.MeshHandle] = []
         for k, (path, color) in enumerate(zip(paths.values(), COLORS, strict=False)):
             self._ghosts.append(Actor(scene, f"take/{k}", shapes, 1.0, color))
-            is_distinct = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1] - 1.0), axis=1) > _MIN_POINT_DISTANCE
-            if np.count_nonzero(is_distinct) > 1:
-                vertices, faces = tube(drawn_at(path[is_distinct]), 0.008, sides=8)
+            if len(points := distinct(path)) > 1:
+                vertices, faces = tube(drawn_at(points), 0.008, sides=8)
                 self._paths.append(scene.add_mesh_simple(f"/take/path/{k}", vertices, faces, color=rgb(color)))
 
     def show(self, poses: Sequence[Array]) -> None:

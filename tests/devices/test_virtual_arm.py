@@ -86,13 +86,16 @@ def test_force_is_finite_and_limited_for_huge_torques(torque: float) -> None:
     assert np.linalg.norm(force) <= 8.5 * (1.0 + 1e-12)
 
 
-@pytest.mark.parametrize("p", [[0.0, 0.0, 5.0], [0.0, -0.6, 0.0]])
-def test_unreachable_point_is_a_fault(p) -> None:
+# Beyond the links' reach, and within it but beyond a limit of the upper arm, the forearm or the elbow.
+@pytest.mark.parametrize(
+    "p", [[0.0, 0.0, 5.0], [0.0, -0.6, 0.0], [0.08, -0.14, -0.28], [0.26, 0.19, -0.3], [-0.23, 0.1, 0.09]]
+)
+def test_point_outside_the_workspace_is_a_fault_that_says_how_far(p) -> None:
     reading = np.ones(9)
     with pytest.raises(DriverFault) as refused:
         write_pose(reading, np.array(p), np.eye(3))
     assert refused.value.fault is Fault.LEFT_WORKSPACE
-    assert refused.value.value > 0.0
+    assert refused.value.value > 0.01
     np.testing.assert_array_equal(reading, np.ones(9))
 
 

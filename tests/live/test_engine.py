@@ -1,6 +1,9 @@
 """The engine of the live page: dragging, bending, gains, stored states, takes."""
 
 import json
+import queue
+import shutil
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,9 +11,11 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import TRACE_SIZE
 from experiments.config.options import run_config
+from experiments.live.session import engine_process
 from experiments.live.session.engine import MAX_HAND_FORCE, Drag, Engine
 from experiments.live.session.engine_process import slice_points
 from experiments.live.session.gains import gains_of, with_gain
+from experiments.live.session.messages import HELD, SHOWN, Board, Record
 from experiments.live.session.takes import Take
 from experiments.results.folder import EDITED, RECORDING, SUMMARY
 from experiments.runs.reproduce import reproduce
@@ -19,6 +24,7 @@ from models.mocap.library import load
 from sim.errors import SimError
 from sim.loop.field_slice import field_slice
 from sim.recording.recording import Recording
+from sim.recording.unclosed import has_writer
 
 
 def make_engine(mode: str = "follow", **words: object) -> Engine:
@@ -134,6 +140,15 @@ def test_bendable_curve_keeps_its_timing_if_a_gain_changes(gain, value):
     assert np.any(engine.stylus != same.stylus)
 
 
+def test_gains_are_kept_at_the_return_to_the_beginning():
+    engine, other = make_engine("stretch-then-follow"), make_engine("stretch-then-follow", stiffness=600.0)
+    record = engine.tubes.record_at(TRACE_SIZE)
+    engine.set_gains(with_gain(engine.config, "stiffness", 600.0))
+    run(engine, 0.4)
+    engine.reset()
+    np.testing.assert_array_equal(engine.memory[:record], other.memory[:record])
+
+
 def test_gains_of_another_mode_are_refused():
     engine = make_engine()
     with pytest.raises(ParameterError, match="same mode and map"):
@@ -241,6 +256,24 @@ def test_too_short_take_is_refused(tmp_path):
     with pytest.raises(SimError, match=r"a take of 0\.01 s is not kept"):
         take.end(engine)
     assert not (tmp_path / "take").exists()
+
+
+def test_full_disk_ends_the_take_and_not_the_session(tmp_path, monkeypatch):
+    engine, answers = make_engine(), queue.Queue[Any]()
+    boards = [Board(Board.memory(fields), fields) for fields in (SHOWN, HELD)]
+    loop: Any = engine_process._EngineLoop(*boards, queue.Queue(), answers)
+    monkeypatch.setattr(loop, "_send_picture", lambda: None)
+    usage = shutil.disk_usage(tmp_path)
+    for name, free in (("first", 0), ("second", usage.free)):
+        monkeypatch.setattr(shutil, "disk_usage", lambda path, free=free: usage._replace(free=free))
+        loop._execute_on_engine(Record(tmp_path / name), engine)
+        for _ in range(80):
+            loop._run_block(engine)
+        loop._stop(engine)
+    refused, *_, saved = [answers.get() for _ in range(answers.qsize())]
+    assert "the disk is full (0 MB free); what was recorded until then is kept" in refused.text
+    assert saved.folder == tmp_path / "second"
+    assert not has_writer(tmp_path / "first" / RECORDING)
 
 
 def test_take_during_pause_leaves_no_folder(tmp_path):

@@ -134,5 +134,5 @@ def _offset_seeds() -> None:
 
     for name in _SEEDED_MODULES:
         importlib.import_module(name).np = _replaced(np, random=_replaced(np.random, default_rng=offset_rng))  # type: ignore[attr-defined]
-    fresh_chance = participant.fresh_chance
-    participant.fresh_chance = lambda seed: fresh_chance(seed + _current["added to seeds"])  # type: ignore[attr-defined]
+    initial_rng = participant.initial_rng
+    participant.initial_rng = lambda seed: initial_rng(seed + _current["added to seeds"])  # type: ignore[attr-defined]

@@ -126,7 +126,7 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
             explanation = f"; played at {fit.natural_rate:.2f} of its speed it would fall with g"
         why = f"{falls}, not within {low:g} to {high:g}{explanation}"
     elif fit.misfit > tolerance.misfit:
-        why = f"strays {100 * fit.misfit:.1f} cm (RMS) from a parabola, more than {100 * tolerance.misfit:g}"
+        why = f"is {100 * fit.misfit:.1f} cm (RMS) from a parabola, more than {100 * tolerance.misfit:g}"
     elif fit.drift > tolerance.drift:
         why = (
             f"turns {np.rad2deg(fit.drift):.0f}° away from constant angular momentum, "

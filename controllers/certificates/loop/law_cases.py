@@ -173,7 +173,7 @@ def _check_inputs(law: FunctionLaw, cases: list[Case], symbols: dict[str, Symbol
     read = casadi.vertcat(
         *(casadi.vertcat(case.force, *(condition.gap for condition in case.conditions)) for case in cases)
     )
-    found = [told for name, told in names.items() if casadi.depends_on(read, symbols[name])]
+    found = [words for name, words in names.items() if casadi.depends_on(read, symbols[name])]
     if found:
         raise ControllerError(
             f"the force of {law.place} depends on {' and '.join(found)} of the hand; a certificate covers forces that "

@@ -220,9 +220,9 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     summary = f"k_r = {river.k_r:g} N/m, b_d = {river.b_d:g} N s/m; {critical} with {hand}"
     if least <= own:
         return Verdict("refuted", f"unstable: {summary}", margin, assumptions, counterexample(river, hand, at), figures)
-    doubt = _reason_not_certified(river, found, least)
-    if doubt is not None:
-        return Verdict("unknown", f"{doubt}; {summary}", margin, assumptions, {}, figures)
+    reason = _reason_not_certified(river, found, least)
+    if reason is not None:
+        return Verdict("unknown", f"{reason}; {summary}", margin, assumptions, {}, figures)
     return Verdict("certified", f"stable: {summary}", margin, assumptions, {}, figures)
 
 

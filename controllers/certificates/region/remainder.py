@@ -149,7 +149,7 @@ def remainder(
         + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
         + tube.mass_slope * t * speed * float((lever / z[:, 0]).max()) * total * level
     )
-    slowest = _min_extent(forms, 2, scale)
+    slowest = float(scale[2] / np.sqrt(forms[:, 2, 2].max()))  # 1/√p_yy for the largest p_yy of the forms [m/s]
     rate = 0.5 * tube.mass_slope * float(drifts.max()) * speed
     rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * overshoot) / slowest * speed
     drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
@@ -182,11 +182,6 @@ def _slide_level(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e:
     cross = 0.5 * spread / scale[0] ** 2 * e
     cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
     return cross
-
-
-def _min_extent(forms: Array, i: int, scale: Array) -> float:
-    """1/√p_ii for the largest p_ii of the forms, in SI units."""
-    return float(scale[i] / np.sqrt(forms[:, i, i].max()))
 
 
 def _max_product(inverses: Array, scale: Array, e: float, v: float) -> float:

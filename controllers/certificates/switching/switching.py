@@ -10,7 +10,7 @@ with G the peak gains of the sampled loop; U_max the hand's force, U_0 that of i
 and ν the effects of encoder quantisation on the law's force and on the measured velocity. The velocity that selects a
 river is low-passed with the time constant τ_s. The filter amplifies no error, and lags behind the current's velocity by
 at most τ_s |φ̈|, so the error is at most E_s = E + τ_s |φ̈|. Hence, as long as the river is active, the mismatch of
-`HigherOrder` obeys s_i² ≤ S² = E_s² + g_i(D) with g = −2σ² ln w. The discount of a rival river's mismatch (see
+`HigherOrder` obeys s_i² ≤ S² = E_s² + g_i(D) with g = −2σ² ln w. The discount of a competing river's mismatch (see
 `mismatch`) removes at most the part of e across its tangent, so with u_j its unit tangent
 
 .. math:: s_j^2 \ge \max(0, |\dot\varphi_i \cdot u_j - |\dot\varphi_j|| - E_s)^2 + g_j(d_j - D)
@@ -73,7 +73,7 @@ class SelectionRule:
 
 @dataclass(frozen=True)
 class CompetingRiver:
-    """A rival river j relative to a river i, at the n phases of i.
+    """A competing river j relative to a river i, at the n phases of i.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class CompetingRiver:
     width: float
 
 
-def rival(held: River, other: River) -> CompetingRiver:
+def competing_river(held: River, other: River) -> CompetingRiver:
     """Another river relative to `held`, at the phases of `held`."""
     points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
     phases, distance = closest_phases(other.curve.packed(), points)
@@ -128,16 +128,16 @@ class Bounds:
 
 @dataclass(frozen=True, eq=False)
 class HandRetention:
-    """One river of a bundle with the others as rivals: bounds under which it keeps its hand."""
+    """One river of a bundle with the others as competitors: bounds under which it keeps its hand."""
 
     held: River
     others: tuple[River, ...]
     sharing: SelectionRule
 
     @cached_property
-    def rivals(self) -> tuple[CompetingRiver, ...]:
+    def competing_rivers(self) -> tuple[CompetingRiver, ...]:
         """The other rivers relative to this one."""
-        return tuple(rival(self.held, other) for other in self.others)
+        return tuple(competing_river(self.held, other) for other in self.others)
 
     @cached_property
     def lag(self) -> float:
@@ -195,12 +195,12 @@ class HandRetention:
     def _retention_margin(self, distance: float, speed_error: float, score: float) -> float:
         """Distance of S from the values at which the river would lose the hand [m/s], for an error of at most E_s."""
         least = self.sharing.admission + self.sharing.hysteresis - score
-        for other in self.rivals:
+        for other in self.competing_rivers:
             inside = 1.0 - (np.maximum(0.0, other.distance - distance) / other.width) ** 2
             inside_tube = inside > 0.0
             distance_cost = -6.0 * self.sharing.sigma**2 * np.log(inside[inside_tube])
-            rival_score = np.sqrt(np.maximum(0.0, other.least[inside_tube] - speed_error) ** 2 + distance_cost)
-            least = min(least, float(np.min(self.sharing.hysteresis + rival_score - score, initial=math.inf)))
+            competing_score = np.sqrt(np.maximum(0.0, other.least[inside_tube] - speed_error) ** 2 + distance_cost)
+            least = min(least, float(np.min(self.sharing.hysteresis + competing_score - score, initial=math.inf)))
         return least
 
     def allowed(self, ceiling: float) -> float:
@@ -266,8 +266,10 @@ def switching(
     sharing = retentions[0].sharing
     allowed = min((retention.allowed(ceiling) for retention in retentions), default=-1.0)
     bounds = [retention.bounds(push) for retention in retentions]
-    rivals = [other for retention in retentions for other in retention.rivals]
-    least = min((float(r.least[r.distance < 2.0 * r.width].min(initial=math.inf)) for r in rivals), default=math.inf)
+    competing_rivers = [other for retention in retentions for other in retention.competing_rivers]
+    least = min(
+        (float(r.least[r.distance < 2.0 * r.width].min(initial=math.inf)) for r in competing_rivers), default=math.inf
+    )
     figures: dict[str, object] = {
         "push_allowed": allowed,
         "score_bound": max(bound.score for bound in bounds),

@@ -192,40 +192,36 @@ def counterexample(
     dict
         The counterexample; empty if there is none.
     """
-    place, along = river.curve.point(phase), river.curve.velocity(phase)
-    before = max(phase - APPROACH_TIME, river.curve.start + 1e-3) if not river.curve.periodic else phase - APPROACH_TIME
-    linear = river.still()
+    curve, period, smooth = river.curve, river.sampling.period, field.form == "smooth"
+    place, along = curve.point(phase), curve.velocity(phase)
+    before = phase - APPROACH_TIME if curve.periodic else max(phase - APPROACH_TIME, curve.start + 1e-3)
     at = int(np.argmin(np.abs(river.phases() - phase)))
-    loop = _at_phase(SampledLoop(linear, river.sampling), at)
-    here = river.curve.point(river.phases()[at])
+    loop, here = _at_phase(SampledLoop(river.still(), river.sampling), at), curve.point(river.phases()[at])
     ahead = along / np.linalg.norm(along)
     aside = towards - ahead * (ahead @ towards)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-12)
-    smooth = field.form == "smooth"
+    start, rest = curve.point(before), 0.0 * ahead
+    first = course(field, loop, here, start, rest, period, river.device).river[0]
+    velocity = rest if first in (-1.0, own) else curve.velocity(before)
     for newtons in pushes:
-        directions = [0.0 * ahead] if newtons == 0.0 else [aside, -aside, ahead, -ahead]
-        starts = [(river.curve.point(before), 0.0 * ahead)]
+        directions = [rest] if newtons == 0.0 else [aside, -aside, ahead, -ahead]
+        hands = [(start, velocity, direction) for direction in directions]
         if newtons == 0.0 and not smooth:
-            starts.append((place, 0.5 * (along + towards)))
-        for start, velocity in starts:
-            for direction in directions:
-                push = Push(tuple((newtons * direction).tolist()), APPROACH_TIME - 0.15, 0.2)
-                at_meeting = start is place
-                simulated = course(field, loop, here, start, velocity, SEARCH_TIME, river.device, push)
-                if not at_meeting and simulated.river[0] not in (-1.0, own):
-                    velocity = river.curve.velocity(before)
-                    simulated = course(field, loop, here, start, velocity, SEARCH_TIME, river.device, push)
-                outcome = failure(simulated.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
-                if outcome is None:
-                    continue
-                confirmation = simulate(start, velocity, SEARCH_TIME, push)
-                confirmed = failure(confirmation.river, river.sampling.period, own, newtons > 0.0 or at_meeting, smooth)
-                if confirmed is not None and confirmed.kind == outcome.kind:
-                    return {
-                        "kind": outcome.kind, "time": outcome.time, "simulated_time": confirmed.time,
-                        "force": [float(f) for f in push.force], "push_start": push.start,
-                        "push_duration": push.duration, "river": own, "p": start, "v": velocity,
-                    }  # fmt: skip
+            hands.append((place, 0.5 * (along + towards), rest))
+        for p, v, direction in hands:
+            push = Push(tuple((newtons * direction).tolist()), APPROACH_TIME - 0.15, 0.2)
+            pushed = newtons > 0.0 or p is place
+            searched = course(field, loop, here, p, v, SEARCH_TIME, river.device, push)
+            found = failure(searched.river, period, own, pushed, smooth)
+            if found is None:
+                continue
+            confirmed = failure(simulate(p, v, SEARCH_TIME, push).river, period, own, pushed, smooth)
+            if confirmed is not None and confirmed.kind == found.kind:
+                return {
+                    "kind": found.kind, "time": found.time, "simulated_time": confirmed.time,
+                    "force": [float(f) for f in push.force], "push_start": push.start,
+                    "push_duration": push.duration, "river": own, "p": p, "v": v,
+                }  # fmt: skip
     return {}
 
 

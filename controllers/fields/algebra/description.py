@@ -4,6 +4,7 @@ import hashlib
 import pickle
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any, cast
 from uuid import uuid4
@@ -30,8 +31,9 @@ def digest(*parts: Array | bytes) -> str:
 def described(value: object) -> object:
     """A parameter as plain data.
 
-    Numbers, strings and short arrays stay as they are; curves, maps and long arrays become a hash; a dataclass becomes
-    its fields by name, a tuple or list (also a named tuple) a list of its described parts.
+    Numbers, strings and short arrays stay as they are, paths become text; curves, maps, functions and long arrays
+    become a hash; a dataclass becomes its fields by name, a tuple or list (also a named tuple) a list of its described
+    parts.
     """
     if isinstance(value, Trajectory):
         return {"curve": digest(value.packed())}
@@ -46,8 +48,12 @@ def described(value: object) -> object:
         return cast(Any, value).description()
     if is_dataclass(value) and not isinstance(value, type):
         return parts_of(value)
+    if callable(value):
+        return {"code": code_digest(value)}
     if isinstance(value, tuple | list):
         return [described(part) for part in cast("list[object]", value)]
+    if isinstance(value, Path):
+        return str(value)
     return value.item() if isinstance(value, np.generic) else value
 
 
@@ -76,13 +82,22 @@ def _content_parts(value: object, seen: set[int]) -> Iterator[bytes]:
         if id(value) not in seen:
             seen.add(id(value))
             yield from _content_parts(value.__code__, seen)
-            read = [value.__globals__[name] for name in value.__code__.co_names if name in value.__globals__]
-            for cell in (*(value.__defaults__ or ()), *(c.cell_contents for c in value.__closure__ or ()), *read):
+            read = [value.__globals__[name] for name in _names_read(value.__code__) if name in value.__globals__]
+            defaults = (*(value.__defaults__ or ()), *(value.__kwdefaults__ or {}).values())
+            for cell in (*defaults, *(c.cell_contents for c in value.__closure__ or ()), *read):
                 yield from _content_parts(cell, seen)
     elif isinstance(value, _IDENTIFIED_BY_NAME):
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
     else:
         yield _pickled(value)
+
+
+def _names_read(code: CodeType) -> Iterator[str]:
+    """Names of globals that code may read, also in the comprehensions, lambdas and functions within it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_read(constant)
 
 
 _IDENTIFIED_BY_NAME = (ModuleType, type, BuiltinFunctionType, np.ufunc)

@@ -120,8 +120,8 @@ def _warped_phase(costs: Array, start: float, gap: float) -> Phase:
     # A closed clip continues with its next lap; an open one is clamped to its ends.
     s = np.mod(s, 1.0) if gap == 0.0 else np.where(lap[:, None] < 1.0 - gap, np.clip(s, 0.0, 1.0), 2.0)
     table = _table_entries(costs, (start + lap)[:, None] + 0.0 * leads, s)
-    prices = _PACE_CHANGE_COST * table.mean() * np.square(_LEAD_CHANGES).astype(np.float64)
-    lead = least_cost_lead(table, _LEAD_CHANGES, prices) / (_STEPS * _LEADS_PER_STEP)
+    penalties = _PACE_CHANGE_COST * table.mean() * np.square(_LEAD_CHANGES).astype(np.float64)
+    lead = least_cost_lead(table, _LEAD_CHANGES, penalties) / (_STEPS * _LEADS_PER_STEP)
     return Phase(start, gap, _smooth_lead(lead, gap))
 
 

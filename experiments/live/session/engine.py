@@ -168,6 +168,7 @@ class Engine:
         changed = (before != after) & ~(np.isnan(before) & np.isnan(after))
         field.memory[state][changed] = after[changed]
         self._initial_memory[state] = after
+        self._changed_by_gains[state] |= changed
         field.budget[:] = parts.tank.params()
         if self.tubes is not None:
             field.params[self._end_parameter] = self._performance_start
@@ -223,6 +224,7 @@ class Engine:
 
     def _restore(self, state: Snapshot) -> None:
         restore_snapshot(self._servo, self.world, state)
+        self.memory[self._changed_by_gains] = self._initial_memory[self._changed_by_gains]
         self.tick = state.tick
         while len(self._states) > 1 and self._states[-1].tick > self.tick:
             self._states.pop()
@@ -235,6 +237,7 @@ class Engine:
         """Index of the parameter with the time at which stretching ends; also stores the field's initial memory."""
         program: Program = self.session.parts.program
         self._initial_memory = program.memory.copy()
+        self._changed_by_gains = np.zeros(len(program.memory), dtype=bool)
         for place in program.places():
             if self.tubes is not None and place.law is self.tubes:
                 self._bend_record = self.tubes.record_at(place.memory)

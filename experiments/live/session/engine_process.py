@@ -41,6 +41,7 @@ from sim.errors import SimError
 from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
+from sim.recording.recorder import DiskFull
 
 # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
 MIN_FRAME_INTERVAL = 0.012
@@ -126,7 +127,11 @@ class _EngineLoop:
         self._update_drag(engine)
         logs = engine.advance()
         if self._take is not None:
-            self._take.add(logs, engine)
+            try:
+                self._take.add(logs, engine)
+            except DiskFull as error:
+                self._take = None
+                self._answers.put(Refused(str(error)))
         self._send_picture()
 
     def _process_orders(self) -> None:
@@ -180,7 +185,7 @@ class _EngineLoop:
         self._answers.put(Progress("saving the take", 0.5))
         try:
             self._answers.put(Saved(take.folder, take.end(engine)))
-        except SimError as error:
+        except (SimError, OSError) as error:
             self._answers.put(Refused(str(error)))
 
     def _build(self, order: Build) -> None:

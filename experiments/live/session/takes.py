@@ -66,7 +66,7 @@ class Take:
         return engine.time - self._start_time
 
     def add(self, logs: tuple[TickLog, FrameLog], engine: Engine) -> None:
-        """Record the last block."""
+        """Record the last block; raises `DiskFull` if there is no room, which ends the recording."""
         ticks, frames = logs
         ticks.hand[:, 0] -= self._start_time
         frames.t[:] -= self._start_time

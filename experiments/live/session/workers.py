@@ -86,32 +86,32 @@ def _main(work: Callable[[Any, Any], None], requests: Any, answers: Any) -> None
     work(requests, answers)
 
 
-def newest(asked: Any) -> Any:
+def newest(requests: Any) -> Any:
     """Wait for a request and return the newest one; None if the page's process has ended."""
     parent = parent_id()
     while True:
         try:
-            request = asked.get(timeout=_CHECK_INTERVAL)
+            request = requests.get(timeout=_CHECK_INTERVAL)
             break
         except queue.Empty:
             if os.getppid() != parent:
                 return None
     while True:
         try:
-            request = asked.get_nowait()
+            request = requests.get_nowait()
         except queue.Empty:
             return request
 
 
-def verdicts(asked: Any, told: Any) -> None:
+def verdicts(requests: Any, answers: Any) -> None:
     """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
     from experiments.live.session.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
 
     gain_verdicts = GainVerdicts()
-    while (config := newest(asked)) is not None:
+    while (config := newest(requests)) is not None:
         for k, now in enumerate(gain_verdicts.of(config)):
-            told.put((config, now, k == 0 and now[0].verdict == "certified"))
-            if not asked.empty():
+            answers.put((config, now, k == 0 and now[0].verdict == "certified"))
+            if not requests.empty():
                 break  # the slider has moved on
 
 
@@ -123,14 +123,14 @@ class Uploaded(NamedTuple):
     text: str
 
 
-def preparation(asked: Any, told: Any) -> None:
+def preparation(requests: Any, answers: Any) -> None:
     """Worker for preparing clips: answers an `Uploaded` to a pair (source, target) of files."""
     from experiments.preparation.command import prepare_file
     from experiments.preparation.prepared_file import summary
     from models.mocap.library import load
     from models.mocap.readers.own_bvh import write_bvh
 
-    while (files := newest(asked)) is not None:
+    while (files := newest(requests)) is not None:
         source, target = files
         begin = time.perf_counter()
         try:
@@ -141,6 +141,6 @@ def preparation(asked: Any, told: Any) -> None:
             else:
                 said = "; ".join(line.strip() for line in summary(prepare_file(source, target, overwrite=True)))
                 text = f"{said}, {time.perf_counter() - begin:.0f} s in all"
-            told.put(Uploaded(source.name, target, text))
+            answers.put(Uploaded(source.name, target, text))
         except (ModelError, ValueError, ArithmeticError) as error:
-            told.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))
+            answers.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))

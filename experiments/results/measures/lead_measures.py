@@ -94,7 +94,8 @@ def lead_summary(
         s = ticks["phase"][first * every : (first + len(t)) * every : every]
         if len(t) > 1:
             turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
-        force = max(force, _max_norm(ticks["field"][first * every : (first + len(t)) * every][:, :2]))
+        forces = ticks["field"][first * every : (first + len(t)) * every][:, :2]
+        force = max(force, float(np.max(np.linalg.norm(forces, axis=1), initial=0.0)))
         soles.add(reference)
         shown.add(s, reference, farthest)
         if figure is not None:
@@ -107,10 +108,6 @@ def lead_summary(
         farthest, (none, one, two), force, 100.0 * soles.slide, None if figure is None else 100.0 * pressing.slide,
         *shown.result(), *physical.result(),
     )  # fmt: skip
-
-
-def _max_norm(vectors: Array) -> float:
-    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
 def support_at(gait: Gait, s: Array) -> IntArray:

@@ -6,7 +6,7 @@ from typing import Literal, cast
 from experiments.results.measures.summary_parts import AnimationSummary, FigureSummary, PathSummary, PushSummary
 from sim.recording.recording import Recording
 
-Doing = Literal["held", "pushed", "undo", "redo", "nothing"]
+PressKind = Literal["held", "pushed", "undo", "redo", "nothing"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class PressSummary:
 
     start: float
     seconds: float
-    what: Doing
+    what: PressKind
     lap: float | None
     dragged_mm: float
     deviation_mm: float

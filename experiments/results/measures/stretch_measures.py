@@ -8,7 +8,7 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.stretchy_tubes import CLICK_DISTANCE, CLICK_TIME, StretchyTubes
 from experiments.results.measures.blocks import ROWS
-from experiments.results.measures.phases import Doing, EditingSummary, PerformanceSummary, PressSummary
+from experiments.results.measures.phases import EditingSummary, PerformanceSummary, PressKind, PressSummary
 from experiments.results.measures.run_measures import Span, measure_span
 from geometry.arrays import Array
 from sim.recording.recording import Channel, Recording
@@ -111,7 +111,7 @@ def _press_summary(ticks: dict[str, Array], curve: Trajectory, epsilon: float, b
     return PressSummary(float(t[0]), seconds, what, lap, 1e3 * dragged, 1e3 * deviation, force)
 
 
-def _press_kind(p: Array, seconds: float, distance: float, epsilon: float) -> Doing:
+def _press_kind(p: Array, seconds: float, distance: float, epsilon: float) -> PressKind:
     """Kind of a press, from the stylus path, the duration [s] and the initial distance from the curve [m]."""
     if distance > epsilon:
         return "pushed"

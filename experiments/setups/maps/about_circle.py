@@ -56,17 +56,20 @@ def place_of(part: Cylindrical | Composite | RiverClips | MapFile) -> Place:
     return Place(curve, around.radius, part.reach, part.expressive)
 
 
-def about_circle(place: Place, made: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None) -> ClipMapParts:
+def about_circle(
+    place: Place, haptic_map: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None
+) -> ClipMapParts:
     """Map parts of a map of clips about a circle.
 
     `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights
     (`timing_clip`).
     """
     curve, reach = place.curve, place.reach
-    played = [clips[i % len(clips)] for i in range(len(made.loops))]
-    off = off_pace(played, made.loops, curve.duration, made.laps, timing_clip(clips) if timing is None else timing)
+    played = [clips[i % len(clips)] for i in range(len(haptic_map.loops))]
+    timing = timing_clip(clips) if timing is None else timing
+    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing)
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, reach=reach,
+        haptic_map=haptic_map, clips=clips, curve=curve, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,

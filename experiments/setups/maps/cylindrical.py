@@ -25,9 +25,7 @@ from sim.compilation.sources import results_folder
 CORNERS = 4  # number of clips
 
 
-def cylindrical_parts(
-    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
-) -> ClipMapParts:
+def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool) -> ClipMapParts:
     """Map parts of four clips at the corners of a hollow cylinder's cross-section (r, z); fewer clips are repeated.
 
     `parallel` says whether the field keeps the pace of a hand that is pushed off its curve.
@@ -49,17 +47,17 @@ def cylindrical_parts(
     if out_of_step(clips, len(motions), lap):
         parts = about_circle(place, with_legs_of(timing_clip(clips)), clips)
         return replace(parts, refined=choose_legs).with_remarks(going_round(clips, legs))
-    made = _cached_map(motions, radii, (-reach, reach), legs, lap)
+    haptic_map = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
         if same(clips):
-            balanced_map = with_balance(made, figure, lap)
+            balanced_map = with_balance(haptic_map, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], made.loops[:1], lap)
+            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], haptic_map.loops[:1], lap)
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
-        return (with_balance(made, figure, lap), ()) if moves_alike(made, lap) else choose_legs()
+        return (with_balance(haptic_map, figure, lap), ()) if moves_alike(haptic_map, lap) else choose_legs()
 
-    return replace(about_circle(place, made, clips), refined=refined).with_remarks(going_round(clips, legs))
+    return replace(about_circle(place, haptic_map, clips), refined=refined).with_remarks(going_round(clips, legs))
 
 
 def _cached_map(
@@ -81,9 +79,7 @@ def _cached_map(
 PARTS = 3  # number of clips
 
 
-def composite_parts(
-    clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool = False
-) -> ClipMapParts:
+def composite_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool) -> ClipMapParts:
     """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
 
     `parallel` is as in `cylindrical_parts`.
@@ -97,13 +93,13 @@ def composite_parts(
     legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
     apart = out_of_step(clips, 3, lap)
-    made = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
+    haptic_map = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
 
     def refined() -> tuple[CompositeMap, tuple[str, ...]]:
-        if carries_alike(made, lap):
-            return made, ()
+        if carries_alike(haptic_map, lap):
+            return haptic_map, ()
         only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
         return select_legs(lambda _: only, [clips[0].name], lap, parallel)
 
-    parts = about_circle(place, made, clips, timing=0)
+    parts = about_circle(place, haptic_map, clips, timing=0)
     return replace(parts, refined=refined).with_remarks(going_round(clips, legs))

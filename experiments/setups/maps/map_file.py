@@ -42,27 +42,29 @@ def map_file_setup(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], fi
         If the file cannot be read, or a lap, a radius or a curve is given to a map that has none.
     """
     path = Path(part.file)
-    made, clips = load_figure_map(path)
-    if isinstance(made, Lifted):
+    haptic_map, clips = load_figure_map(path)
+    if isinstance(haptic_map, Lifted):
         if part.around != Circle():
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
-        parts = lifted_parts(made, clips, part)
+        parts = lifted_parts(haptic_map, clips, part)
         pushed = config.user.does == "push" and config.figure.kind == "physical"
         if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
-            parts = replace(parts, refined=partial(carried_over, made, best_transition(made, part.curve)))
+            parts = replace(parts, refined=partial(carried_over, haptic_map, best_transition(haptic_map, part.curve)))
         elif pushed and not isinstance(config.mode, Rivers):
-            number = curve_number(made, part.curve)
-            followed = partial(followed_map, made, parts.curve, number, arms(made.limbs), flows_parallel(config))
+            number = curve_number(haptic_map, part.curve)
+            followed = partial(
+                followed_map, haptic_map, parts.curve, number, arms(haptic_map.limbs), flows_parallel(config)
+            )
             parts = replace(parts, refined=followed)
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or name a lifted map")
     else:
-        parts = about_circle(place_of(part), made, clips)
-    remark = f"the clips are those of the map: {', '.join(made.names)}"
+        parts = about_circle(place_of(part), haptic_map, clips)
+    remark = f"the clips are those of the map: {', '.join(haptic_map.names)}"
     return replace(parts.with_remarks((remark,)), static={"map_sha256": map_digest(path)})
 
 
-def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:
+def lifted_parts(haptic_map: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:
     """Map parts of a lifted map, beginning on one of its curves.
 
     Raises
@@ -72,15 +74,15 @@ def lifted_parts(made: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMa
     SimError
         If the Phantom does not reach it.
     """
-    curve = lifted_curve(made, part.curve)
+    curve = lifted_curve(haptic_map, part.curve)
     ends = (
         f"the clip is open: the hand, and with it the figure, is held at its curve's end after {curve.duration:.1f} s"
     )
     between = not_blendable(clips)
     return ClipMapParts(
-        haptic_map=made, clips=clips, curve=curve, reach=part.reach,
-        rivers=lambda mode: lifted_choice(made, mode),
-        river_pushes=lambda mode, seconds: default_pushes(made, part.curve, mode),
+        haptic_map=haptic_map, clips=clips, curve=curve, reach=part.reach,
+        rivers=lambda mode: lifted_choice(haptic_map, mode),
+        river_pushes=lambda mode, seconds: default_pushes(haptic_map, part.curve, mode),
         course=cache(partial(course_of, curve)),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY,
         curve_clip_seconds=curve.duration,

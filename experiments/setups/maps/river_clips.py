@@ -40,13 +40,13 @@ def river_clips_setup(
     motions, place = motions_of(clips, 3, part.kind), place_of(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     laps, apart = _fit_round(clips, 3, place.curve.duration)
-    made = RiverClipsMap(
+    haptic_map = RiverClipsMap(
         curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
-    parts, names = about_circle(place, made, clips), [clips[i % len(clips)].name for i in range(3)]
+    parts, names = about_circle(place, haptic_map, clips), [clips[i % len(clips)].name for i in range(3)]
 
     def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
-        ready = with_rests(made, figure)
+        ready = with_rests(haptic_map, figure)
         if config.figure.kind != "physical" or same(clips):
             return ready, ()
         changing = with_changes(ready, config.figure.blend, figure)

@@ -77,14 +77,14 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
             f"{1e3 * _TOOL_RANGE[0]:.0f} mm from its home; expected --scale {_TOOL_RANGE[0] / away:.2g} or less, or a "
             "smaller curve"
         )
-    made = robot_arm_map(arm, scale)
+    haptic_map = robot_arm_map(arm, scale)
 
     def refined() -> tuple[ClipMap, tuple[str, ...]]:
-        made.check_domain(arm_limits(arm), _evaluate)
-        return cast(ClipMap, made), ()
+        haptic_map.check_domain(arm_limits(arm), _evaluate)
+        return cast(ClipMap, haptic_map), ()
 
     return ClipMapParts(
-        haptic_map=cast(ClipMap, made), clips=(), curve=curve, reach=reach, turning=True, refined=refined,
+        haptic_map=cast(ClipMap, haptic_map), clips=(), curve=curve, reach=reach, turning=True, refined=refined,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
         course=cache(partial(course_of, curve)),

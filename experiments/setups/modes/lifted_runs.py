@@ -113,25 +113,25 @@ def best_transition(haptic_map: Lifted, curve: str) -> MapTransition:
     return own[0]
 
 
-def places_apart(made: Lifted, transition: MapTransition) -> float:
+def places_apart(haptic_map: Lifted, transition: MapTransition) -> float:
     """Distance over the floor between the places of two motions at their transition [m]; needs compiled code.
 
     With q_i the point of curve i at the transition's θ, it is that of the roots of h(q_first) and h(q_second) in one
     frame of the lap. Transitions are found regardless of it: motions that travel there and back within a lap may be far
     apart.
     """
-    points = np.array([made.curve_point(i, transition.angle) for i in (transition.first, transition.second)])
-    first, second = map_poses(made, stylus_path(points), made.compiled().memory)[:, :2]
+    points = np.array([haptic_map.curve_point(i, transition.angle) for i in (transition.first, transition.second)])
+    first, second = map_poses(haptic_map, stylus_path(points), haptic_map.compiled().memory)[:, :2]
     return float(np.linalg.norm(second - first))
 
 
-def carried_over(made: Lifted, transition: MapTransition) -> tuple[Lifted, tuple[str, ...]]:
+def carried_over(haptic_map: Lifted, transition: MapTransition) -> tuple[Lifted, tuple[str, ...]]:
     """The map, and a remark if a change at a transition moves the figure too far to be followed."""
-    apart = places_apart(made, transition)
+    apart = places_apart(haptic_map, transition)
     if apart < _MAX_CARRY_DISTANCE:
-        return made, ()
-    names = f"{made.names[transition.first]} and {made.names[transition.second]}"
-    return made, (
+        return haptic_map, ()
+    names = f"{haptic_map.names[transition.first]} and {haptic_map.names[transition.second]}"
+    return haptic_map, (
         f"where {names} agree, their positions on the floor are {apart:.1f} m apart: a push over carries the figure "
         "there within a quarter of a second, and it may fall; clips that stay in place, or keep going, suit better",
     )

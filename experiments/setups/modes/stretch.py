@@ -12,7 +12,7 @@ from controllers.fields.stretchy_tubes import StretchyTubes
 from controllers.safety.energy_tank import river_power, spring_store
 from controllers.safety.limiter import ForceLimiter
 from controllers.state import stylus_path
-from experiments.config.modes import Stretch, StretchThenFollow
+from experiments.config.modes import Stretch, StretchThenFollow, StretchyTube
 from experiments.config.run_config import Replay, RunConfig, User
 from experiments.results.measures.stretch_measures import editing_summary, performance_summary
 from experiments.results.measures.stretch_summary import stretch_summary
@@ -77,7 +77,7 @@ class _Performance(NamedTuple):
     power: float = 0.0
 
 
-def _resolve_user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts) -> User:
+def _resolve_user(config: RunConfig, mode: StretchyTube, maps: ClipMapParts) -> User:
     if isinstance(config.device, Replay):
         return config.user
     by_default = stretch_grabs(maps.curve, mode.rubber_tube, maps.carry)
@@ -88,7 +88,7 @@ def _resolve_user(config: RunConfig, mode: Stretch | StretchThenFollow, maps: Cl
 
 
 def _make_parts(
-    config: RunConfig, mode: Stretch | StretchThenFollow, maps: ClipMapParts, course: Trajectory,
+    config: RunConfig, mode: StretchyTube, maps: ClipMapParts, course: Trajectory,
     performance: _Performance, remarks: tuple[str, ...],
 ) -> Parts:  # fmt: skip
     if mode.bump > 0.5 * course.duration:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from experiments.config.maps import Composite, MapFile
-from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow
+from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow, StretchyTube
 from experiments.config.run_config import RunConfig
 
 # Rivers of a map from a file lie side by side. A larger τ = b_d/k_r draws a hand over from one to the other more
@@ -52,7 +52,7 @@ def river_gains(mode: Rivers) -> tuple[float, float]:
     return mode.stiffness or _RIVER_GAINS["stiffness"], mode.damping or _RIVER_GAINS["damping"]
 
 
-def tube_gains(mode: Stretch | StretchThenFollow) -> tuple[float, float]:
+def tube_gains(mode: StretchyTube) -> tuple[float, float]:
     """k_f [N/m] and damping [N s/m] of a tube; gains that are not set have their defaults about a circle."""
     return (
         _TUBE_GAINS["seek"] if mode.seek is None else mode.seek,

@@ -103,8 +103,8 @@ def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps:
     if governor is None:
         return law, 0.0
     speeds = speeds_along(maps, maps.curve, course=course)
-    made = Governor(course, speeds, governor.governor_drag, maps.reach)
-    return Governed(law, made), float(speeds[:, 0].max())
+    added = Governor(course, speeds, governor.governor_drag, maps.reach)
+    return Governed(law, added), float(speeds[:, 0].max())
 
 
 @dataclass(frozen=True, eq=False)

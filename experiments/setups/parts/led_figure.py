@@ -63,11 +63,11 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
     """
     if len(clips) != 1:
         raise ParameterError(f"one clip is led, got {len(clips)}; expected --clips of one, such as walk or run")
-    made, gait = led_map(clips[0], figure, is_authored(config))
+    haptic_map, gait = led_map(clips[0], figure, is_authored(config))
     return LedParts(
-        haptic_map=made, clips=clips, curve=s_curve(), gait=gait,
-        refined=lambda: (_begun_in_balance(balanced_on_ground(made, gait, figure), figure), ()),
-        remarks=lap_remark(clips[0], config.figure.kind) + gait_remark(clips[0].name, made, config.figure.kind),
+        haptic_map=haptic_map, clips=clips, curve=s_curve(), gait=gait,
+        refined=lambda: (_begun_in_balance(balanced_on_ground(haptic_map, gait, figure), figure), ()),
+        remarks=lap_remark(clips[0], config.figure.kind) + gait_remark(clips[0].name, haptic_map, config.figure.kind),
     )  # fmt: skip
 
 
@@ -115,11 +115,11 @@ def led_map(clip: Clip, figure: mujoco.MjModel, authored: bool = True) -> tuple[
     clip, capture = lap.clip.resized(size), Capture(CONTACT_RADIUS * size)
     if not closes:
         return _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
-    made = _map_and_gait(clip, legs, marks.planted[:-1], None)
-    if made[0].flies and not (authored and made[0].has_grounded_form):
+    as_recorded = _map_and_gait(clip, legs, marks.planted[:-1], None)
+    if as_recorded[0].flies and not (authored and as_recorded[0].has_grounded_form):
         steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
-        return steps if steps[0].has_grounded_form else made
-    return made
+        return steps if steps[0].has_grounded_form else as_recorded
+    return as_recorded
 
 
 def _begun_in_balance(led: Led, figure: mujoco.MjModel) -> Led:
@@ -135,15 +135,15 @@ def _begun_in_balance(led: Led, figure: mujoco.MjModel) -> Led:
     return led.begun_at((led.phase + later / _PHASE_COUNT) % 1.0)
 
 
-def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stands: Mask, capture: Capture | None) -> tuple[Led, Gait]:
-    """Map and gait of one lap; `stands` marks the feet on the floor in each of its frames but the last."""
+def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stance: Mask, capture: Capture | None) -> tuple[Led, Gait]:
+    """Map and gait of one lap; `stance` marks the feet on the floor in each of its frames but the last."""
     phases, steps = np.linspace(0.0, 1.0, _PHASE_COUNT, endpoint=False), clip.n_frames - 1
-    sampled = stands[np.round(phases * steps).astype(int) % steps]
+    sampled = stance[np.round(phases * steps).astype(int) % steps]
     support = sampled.sum(axis=1).astype(np.int64)
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stands, capture)
+    led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stance, capture)
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.has_grounded_form and not led.flies
@@ -187,21 +187,21 @@ def stances(marks: Contacts, fps: float) -> Mask:
     no foot is settled, a foot that was in stance and is still planted stays in stance: it has not left the floor, but
     sunk into it. A flight shorter than `MIN_CLIP_FLIGHT_DURATION` is ignored: feet in stance before it stay in stance.
     """
-    stands, rests = marks.settled[:-1], marks.planted[:-1]
-    n = len(stands)
-    for foot in range(stands.shape[1]):
-        for start, end in runs(~stands[:, foot]):
+    stance, rests = marks.settled[:-1], marks.planted[:-1]
+    n = len(stance)
+    for foot in range(stance.shape[1]):
+        for start, end in runs(~stance[:, foot]):
             if end - start < _MIN_SWING_TIME * fps:
-                stands[np.arange(start, end) % n, foot] = True
-    for start, end in runs(~np.any(stands, axis=1)):
+                stance[np.arange(start, end) % n, foot] = True
+    for start, end in runs(~np.any(stance, axis=1)):
         for sample in range(start, end):
-            stands[sample % n] = stands[sample % n - 1] & rests[sample % n]
-            if not stands[sample % n].any():
+            stance[sample % n] = stance[sample % n - 1] & rests[sample % n]
+            if not stance[sample % n].any():
                 break
-    for start, end in runs(~np.any(stands, axis=1)):
+    for start, end in runs(~np.any(stance, axis=1)):
         if end - start < MIN_CLIP_FLIGHT_DURATION * fps:
-            stands[np.arange(start, end) % n] = stands[start - 1]
-    return stands
+            stance[np.arange(start, end) % n] = stance[start - 1]
+    return stance
 
 
 def gait_remark(name: str, led: Led, figure: FigureKind) -> tuple[str, ...]:

@@ -147,9 +147,11 @@ class MapParts(Generic[Map]):
         """The same parts with the improved map and, for a physical figure, remarks on it; needs compiled code."""
         if self.refined is None:
             return self
-        made, figure_remarks = self.refined()
+        haptic_map, figure_remarks = self.refined()
         return replace(
-            self, haptic_map=made, remarks=self.remarks + made.remarks + (figure_remarks if physical else ())
+            self,
+            haptic_map=haptic_map,
+            remarks=self.remarks + haptic_map.remarks + (figure_remarks if physical else ()),
         )
 
 

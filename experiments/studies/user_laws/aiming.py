@@ -21,7 +21,7 @@ _TRIAL_DURATION = 20.0  # [s] in which also the slowest people complete all move
 def fitts(people: Sequence[Person], seed: int) -> Study:
     """Fitts' law: time from click to click over the index of difficulty log₂(A/W + 1) (MacKenzie 1992)."""
     difficulty, times = list[float](), list[float]()
-    for amplitude, width in _conditions():
+    for amplitude, width in ((a, w) for a in AMPLITUDES for w in WIDTHS if a >= 2.0 * w):
         found = np.concatenate([
             np.diff(_tap(person, amplitude, width, seed + i).clicks)[_N_PRACTICE:] for i, person in enumerate(people)
         ])  # fmt: skip
@@ -85,10 +85,6 @@ def _first_ends(trace: Trace) -> Array:
         if len(stopped):
             ends.append(float(position[fastest + stopped[0]]))
     return np.array(ends)
-
-
-def _conditions() -> list[tuple[float, float]]:
-    return [(amplitude, width) for amplitude in AMPLITUDES for width in WIDTHS if amplitude >= 2.0 * width]
 
 
 def _tap(person: Person, amplitude: float, width: float, seed: int) -> Trace:

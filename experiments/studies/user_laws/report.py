@@ -52,12 +52,10 @@ def young_adults(people: int, seed: int) -> tuple[Person, ...]:
         If there are no people.
     """
     population(people, seed)  # refuses a number of people that is none
-    everybody = itertools.count(2 * people, 2 * people)
-    return next(young[:people] for n in everybody if len(young := _young_people(n, seed)) >= people)
-
-
-def _young_people(number: int, seed: int) -> tuple[Person, ...]:
-    return tuple(person for person in population(number, seed) if person.age <= _MAX_AGE)
+    adults = (
+        tuple(p for p in population(n, seed) if p.age <= _MAX_AGE) for n in itertools.count(2 * people, 2 * people)
+    )
+    return next(young[:people] for young in adults if len(young) >= people)
 
 
 def laws_into(out: Path, people: int, seed: int, names: tuple[str, ...], overwrite: bool) -> list[Law]:

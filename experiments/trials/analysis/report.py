@@ -39,13 +39,13 @@ users. Grey: no difference is shown. {interactions}</p>
 {replays}
 <h2>The study</h2>
 <pre>{study}</pre>
-<p class="note">{made}</p>
+<p class="note">{provenance}</p>
 """
 
 
 def _page(
     study: StudyConfig, text: str, said: Sequence[str], found: Statistics, plots: Mapping[str, Figure],
-    failures: Mapping[str, int], shown: Sequence[Replay], made: str,
+    failures: Mapping[str, int], shown: Sequence[Replay], provenance: str,
 ) -> str:  # fmt: skip
     """HTML of the page; the arguments are those of `write_report`, and plots by caption, failures by reason."""
     names = list(dict.fromkeys(contrast.measure for contrast in found.contrasts))
@@ -66,7 +66,7 @@ def _page(
             for r in shown
         ),
         study=html.escape(text),
-        made=html.escape(made),
+        provenance=html.escape(provenance),
     )
     return html_page(study.name, body, NUMBERS)
 
@@ -128,7 +128,7 @@ _CONTRASTS_FILE = "contrasts.csv"
 
 
 def write_report(
-    study: StudyConfig, text: str, trials: Sequence[Trial], frame: Any, path: Path, made: str
+    study: StudyConfig, text: str, trials: Sequence[Trial], frame: Any, path: Path, provenance: str
 ) -> tuple[Statistics, tuple[str, ...]]:
     """Analyse a table and write the page; returns the statistics and the three sentences.
 
@@ -142,7 +142,7 @@ def write_report(
         The table.
     path : Path
         HTML file; the contrasts are written beside it.
-    made : str
+    provenance : str
         Code, libraries and processors that the study was made with.
     """
     import pandas as pd
@@ -160,7 +160,7 @@ def write_report(
     replay_measure = next((name for name in (study.ease, study.cost, *measures) if name in measures), None)
     shown = replays(tuple(trials), frame, replay_measure) if replay_measure else ()
     counts = {str(reason): int(count) for reason, count in failures.items()}
-    write_text(path, _page(study, text, said, found, plots, counts, shown, made))
+    write_text(path, _page(study, text, said, found, plots, counts, shown, provenance))
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
     pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)

@@ -11,6 +11,7 @@ from experiments.config.run_config import RunConfig
 from experiments.trials.design.plan import trial_key
 from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.run_trial import Row, Task, perform_trial
+from sim.recording.recorder import DiskFull
 
 # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
 TASKS_PER_THREAD = 3
@@ -64,7 +65,7 @@ class Cluster:
 
         try:
             row = future.result()
-        except StudyError:
+        except (StudyError, DiskFull):
             raise
         except KilledWorker:
             key = str(future.key).removeprefix("trial-")

@@ -11,6 +11,8 @@ from rich.text import Text
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
+from experiments.setups.modes.fixed_curve import flows_parallel
+from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyError
 from experiments.trials.execution.database import Database
@@ -41,7 +43,8 @@ def compile_and_make_maps(configs: Iterable[RunConfig], console: Console) -> Non
 def _compilation_key(config: RunConfig) -> object:
     """Key of the settings that determine which compiled units and which map a run needs."""
     options = tuple(getattr(config.mode, name, None) is not None for name in ("orientation", "governor", "walls"))
-    return config.mode.kind, options, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
+    flow = flows_parallel(resolved(config))
+    return config.mode.kind, options, flow, config.map, config.figure.kind, config.user.does, bool(config.user.turns)
 
 
 _PROBE_FILE = ".hvf"

@@ -29,7 +29,7 @@ class Threads:
 
         Raises
         ------
-        OSError, MemoryError
+        OSError, MemoryError, DiskFull
             If the machine lacks something.
         """
         pool, waiting = ThreadPoolExecutor(self._number), set[Future[Row]]()
@@ -60,5 +60,5 @@ def executor(where: Where) -> Generator[Executor]:
         return
     from experiments.trials.execution.cluster import cluster_at, local_cluster  # Dask takes a second to import
 
-    with local_cluster(where.workers) if where.workers is not None else cluster_at(where.cluster or "") as made:
-        yield made
+    with local_cluster(where.workers) if where.workers is not None else cluster_at(where.cluster or "") as executor:
+        yield executor

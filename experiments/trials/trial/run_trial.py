@@ -15,13 +15,15 @@ from experiments.config.maps import Composite, Cylindrical
 from experiments.config.part import from_json, to_dict
 from experiments.config.run_config import RunConfig
 from experiments.results.folder import RECORDING
+from experiments.setups.modes.fixed_curve import flows_parallel
+from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import TrialLog, measure_trial
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
-from sim.recording.recorder import Recorder
+from sim.recording.recorder import DiskFull, Recorder
 
 State = Literal["done", "failed"]
 
@@ -88,10 +90,10 @@ class MapCache:
 
 
 def _map_key(config: RunConfig) -> object:
-    """Key of the settings that a map depends on: map and figure if it is about a circle, else all but seed and user."""
+    """Key of the settings that a map depends on: map, flow and figure about a circle, else all but seed and user."""
     figure = (config.figure.kind == "none", config.figure.stature, config.figure.mass)
     if isinstance(config.map, Cylindrical | Composite):
-        return config.map, figure
+        return config.map, flows_parallel(resolved(config)), figure  # the flow moves a hand that is pushed off
     return replace(config, seed=1, user=type(config.user)(does=config.user.does)), figure
 
 
@@ -99,21 +101,21 @@ MAP_CACHE = MapCache()
 """The cache of this process."""
 
 
-def perform_trial(task: Task, shelf: MapCache = MAP_CACHE) -> Row:
+def perform_trial(task: Task, maps: MapCache = MAP_CACHE) -> Row:
     """Run a trial and measure it; an error in the trial gives a row with its reason.
 
     Errors of the machine rather than the trial are raised, so that the trial can be tried again.
 
     Raises
     ------
-    OSError, MemoryError
+    OSError, MemoryError, DiskFull
         If the machine lacks something.
     """
     worker, start = f"{platform.node()}:{os.getpid()}", time.thread_time()
     try:
         config = from_json(RunConfig, task.config, "a trial's configuration")
-        measures = _run_trial(config, task, shelf)
-    except (OSError, MemoryError):
+        measures = _run_trial(config, task, maps)
+    except (OSError, MemoryError, DiskFull):
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
@@ -121,8 +123,8 @@ def perform_trial(task: Task, shelf: MapCache = MAP_CACHE) -> Row:
     return Row(task.key, "done", "", measures, time.thread_time() - start, worker, get_host_cpu_name())
 
 
-def _run_trial(config: RunConfig, task: Task, shelf: MapCache) -> dict[str, float]:
-    session = shelf.session(config)
+def _run_trial(config: RunConfig, task: Task, maps: MapCache) -> dict[str, float]:
+    session = maps.session(config)
     log = TrialLog(session.servo, session.world)
     if not task.recordings:
         return _simulate(config, session, log)

@@ -93,9 +93,9 @@ class Contacts(NamedTuple):
     def settled(self) -> Mask:
         """Whether each foot stands at rest and near the median height of its stance, left and right, shape (n, 2)."""
         settled = self.planted
-        for foot, stands in enumerate(settled.T):
+        for foot, stance in enumerate(settled.T):
             lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
-            for start, end in spans(stands):
+            for start, end in spans(stance):
                 level = float(np.median(lowest[start:end]))
                 settled[start:end, foot] = lowest[start:end] < level + _MAX_SETTLED_RISE
         return settled
@@ -128,8 +128,8 @@ def contacts(clip: Clip) -> Contacts:
     slow = (heights < max_heights) & (speeds < max_speeds)
     sliding = (heights < _MAX_SLIDING_HEIGHT) & (vertical_speeds < _MAX_VERTICAL_SPEED)
     resting = slow.copy()
-    stands = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSURE_TOLERANCE))
-    resting[:, :feet] &= np.repeat(stands, 2, axis=2).reshape(-1, feet)
+    stance = standing_parts(places[:, :feet], clip.poses[:, :2], clip.fps, clip.closes(CLOSURE_TOLERANCE))
+    resting[:, :feet] &= np.repeat(stance, 2, axis=2).reshape(-1, feet)
     return Contacts(heights, (heights < _CONTACT_HEIGHT) | slow | sliding, resting)
 
 
@@ -157,16 +157,16 @@ def standing_parts(soles: Array, root: Array, fps: float, closed: bool = False) 
     if len(soles) > 1:
         speeds = np.linalg.norm(np.gradient(middles, axis=0), axis=3) * fps
         pace = np.linalg.norm(np.gradient(root, axis=0), axis=1) * fps
-    stands = (heights < _MAX_STANCE_HEIGHT) & (
+    stance = (heights < _MAX_STANCE_HEIGHT) & (
         speeds < np.maximum(_MAX_STANCE_SPEED, _ROOT_SPEED_FRACTION * pace)[:, None, None]
     )
-    stands[:, :, 1] |= stands[:, :, 0] & (heights[:, :, 1] < _MAX_TOE_HEIGHT) & (speeds[:, :, 1] < _MAX_TOE_SPEED)
+    stance[:, :, 1] |= stance[:, :, 0] & (heights[:, :, 1] < _MAX_TOE_HEIGHT) & (speeds[:, :, 1] < _MAX_TOE_SPEED)
     for foot in range(2):
         for part in range(2):
-            stands[:, foot, part] = cleaned(
-                stands[:, foot, part], round(MAX_FILLED_GAP * fps), round(MIN_STANCE_TIME * fps), closed
+            stance[:, foot, part] = cleaned(
+                stance[:, foot, part], round(MAX_FILLED_GAP * fps), round(MIN_STANCE_TIME * fps), closed
             )
-    return stands
+    return stance
 
 
 def _lower_one_sided_speed(speeds: Array) -> Array:

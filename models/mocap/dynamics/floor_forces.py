@@ -163,8 +163,8 @@ class Floor:
         """f*: forces along the pyramids' edges, shape (m, 4k) [N]; only spheres in `standing` (m, k) bear load."""
         columns = self._scale[:, None] * demand.columns()
         grip = np.zeros((len(columns), columns.shape[2]))
-        for k, stands in enumerate(standing):
-            edges = np.flatnonzero(np.repeat(stands, 4))
+        for k, loaded in enumerate(standing):
+            edges = np.flatnonzero(np.repeat(loaded, 4))
             if len(edges):
                 system = np.concatenate([columns[k][:, edges], _REGULARISATION * np.eye(len(edges))])
                 grip[k, edges] = nnls(system, np.concatenate([self._scale * demand.wrench[k], np.zeros(len(edges))]))[0]

@@ -198,14 +198,14 @@ def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
         swinging = ~laps[:, spheres].any(axis=1)
         height = np.where(swinging, _SWING_CLEARANCE, np.where(turns[:, foot], _PIVOT_CLEARANCE, 0.0))
         for sphere in range(4 * foot, 4 * foot + 4):
-            stands = np.flatnonzero(laps[:, sphere])
-            if not len(stands):
+            stance = np.flatnonzero(laps[:, sphere])
+            if not len(stance):
                 continue
             frames = np.arange(len(laps))
-            after = np.searchsorted(stands, frames)
+            after = np.searchsorted(stance, frames)
             distance = np.minimum(
-                np.abs(frames - stands[np.minimum(after, len(stands) - 1)]),
-                np.abs(frames - stands[np.maximum(after - 1, 0)]),
+                np.abs(frames - stance[np.minimum(after, len(stance) - 1)]),
+                np.abs(frames - stance[np.maximum(after - 1, 0)]),
             )
             risen_height = height * np.minimum(distance / (_CLEARANCE_TIME * fps), 1.0)
             least[:, sphere] = risen_height[lap]
@@ -237,8 +237,8 @@ def _sphere_mask(parts: Mask) -> Mask:
 
 def _is_unsupported(parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:
     """Whether nothing stands although the body is under load, shape (n,)."""
-    stands = parts.any(axis=(1, 2)) | hands.any(axis=1)
-    return cleaned(~stands & (load > MIN_LOAD), round(_FILLED_GAP_TIME * fps), 2)
+    supported = parts.any(axis=(1, 2)) | hands.any(axis=1)
+    return cleaned(~supported & (load > MIN_LOAD), round(_FILLED_GAP_TIME * fps), 2)
 
 
 def _sliding_spheres(points: Array, parts: Mask, hands: Mask, load: Array, fps: float) -> Mask:

@@ -110,7 +110,7 @@ class WellFormed:
             (self.flight_error, MAX_FLIGHT_ACCELERATION_ERROR, "flights differ from gravity by {} m/s²; {:g} at most"),
             (1000 * self.skate, 1000 * MAX_SKATE, "feet skate by {} mm in a stance; {:g} at most"),
             (1000 * self.depth, 1000 * MAX_SOLE_DEPTH, "a sole goes {} mm below the floor; {:g} at most"),
-            (off, 0.0, f"soles stand at {stand}; −{-1000 * MIN_SOLE_HEIGHT:.0f} to {1000 * MAX_SOLE_HEIGHT:.0f}"),
+            (off, 0.0, f"soles stand at {stand}; {1000 * MIN_SOLE_HEIGHT:.0f} to {1000 * MAX_SOLE_HEIGHT:.0f}"),
             (np.rad2deg(self.tilt), np.rad2deg(MAX_SOLE_TILT), "soles are tilted by {}°; {:g}° at most"),
             (self.outliers, 0, f"{self.outliers} frames are outliers in acceleration; 0 at most"),
             (self.seam, MAX_SEAM_VELOCITY_JUMP, "velocities at the seam differ by {} rad/s; {:g} at most")

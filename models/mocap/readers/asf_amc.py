@@ -155,8 +155,10 @@ def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - one branch per section o
         elif section == "hierarchy" and keyword not in ("begin", "end"):
             _read_children(skeleton, fields, path, line)
     if len(skeleton.parents) != len(skeleton.bones) - 1 or not skeleton.parents:
-        stray = next((name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone")
-        raise MotionFileError(path, 0, f"{quoted(stray)} is not in the hierarchy", "a parent for every bone")
+        orphan = next(
+            (name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone"
+        )
+        raise MotionFileError(path, 0, f"{quoted(orphan)} is not in the hierarchy", "a parent for every bone")
     return _order_from_root(skeleton, path)
 
 

@@ -94,11 +94,11 @@ def levelled(root: Array, segments: Array, fps: float) -> tuple[Array, Array, fl
         return root, segments, 0.0
     speed = np.linalg.norm(np.gradient(middle, axis=0), axis=2)[lower] * fps
     # Not `contacts.standing_parts`: the floor, above which a sole could be low, is not known yet.
-    stands = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < MAX_STANDING_SPEED)
-    begins = stands & (np.diff(np.where(stands, lower[1], -1), prepend=-1) != 0)  # also if the other foot takes over
+    stance = (np.ptp(points[lower][..., 2], axis=1) < _MAX_SOLE_RANGE) & (speed < MAX_STANDING_SPEED)
+    begins = stance & (np.diff(np.where(stance, lower[1], -1), prepend=-1) != 0)  # also if the other foot takes over
     stances = int(begins.sum())
     slopes = (
-        _floor_slopes(middle[lower][stands], lower[1][stands], stances) if stances >= _MIN_STANCE_COUNT else np.zeros(2)
+        _floor_slopes(middle[lower][stance], lower[1][stance], stances) if stances >= _MIN_STANCE_COUNT else np.zeros(2)
     )
     angle = float(np.arctan(np.linalg.norm(slopes)))
     if not _SLOPE_RANGE[0] < angle < _SLOPE_RANGE[1]:

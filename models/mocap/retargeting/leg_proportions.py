@@ -52,16 +52,16 @@ def hips_over_feet(root: Array, segments: Array, legs: Array, ankles: Array, fps
     heights = places[..., 2]
     lower = np.arange(len(root)), heights.argmin(axis=1)
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=2)[lower] * fps
-    stands = np.flatnonzero(speed < MAX_STANDING_SPEED)
-    if len(stands) == 0:
+    stance_frames = np.flatnonzero(speed < MAX_STANDING_SPEED)
+    if len(stance_frames) == 0:
         return root
     weights = np.exp((heights[lower][:, None] - heights) / _WEIGHT_DECAY_HEIGHT)
     joints = segment_positions(root, segments)
     excess = (weights * (legs - (joints[:, _FEET] - joints[:, _THIGHS]))[..., 2]).sum(axis=1) / weights.sum(axis=1)
     level = heights[lower]
-    if _height_range((level - excess)[stands]) < _height_range(level[stands]) + _MIN_IMPROVEMENT:
+    if _height_range((level - excess)[stance_frames]) < _height_range(level[stance_frames]) + _MIN_IMPROVEMENT:
         return root
-    shift = np.interp(np.arange(len(root)), stands, excess[stands])
+    shift = np.interp(np.arange(len(root)), stance_frames, excess[stance_frames])
     shift = gaussian_filter1d(shift, _SMOOTHING * fps, mode="nearest")
     return root + np.outer(shift - shift[0], [0.0, 0.0, 1.0])
 

@@ -202,9 +202,9 @@ def leg_speed_remarks(legs: Array, fps: float) -> Iterator[str]:
         Frame rate [1/s].
     """
     speeds = np.linalg.norm(np.diff(legs, axis=0), axis=2).max(axis=1, initial=0.0) * fps
-    swift = float(np.quantile(speeds, _SPEED_QUANTILE)) if len(speeds) else 0.0
-    if swift > _MAX_ANKLE_SPEED:
-        remark = f"legs swing at {swift:.0f} m/s and more for a tenth of the time, faster than any human's"
+    fast = float(np.quantile(speeds, _SPEED_QUANTILE)) if len(speeds) else 0.0
+    if fast > _MAX_ANKLE_SPEED:
+        remark = f"legs swing at {fast:.0f} m/s and more for a tenth of the time, faster than any human's"
         yield f"{remark}: if {fps:g} frames a second are wrong, give --frame-rate"
 
 
@@ -312,7 +312,7 @@ def two_digits(number: float) -> str:
 def axis_name(direction: Array) -> str:
     """The axis nearest to a direction, such as ``+Y``."""
     axis = int(np.argmax(np.abs(direction)))
-    return f"{'+' if direction[axis] > 0 else '−'}{'XYZ'[axis]}"
+    return f"{'+' if direction[axis] > 0 else '-'}{'XYZ'[axis]}"
 
 
 def unit_name(unit: float | None, leg: float, own_leg: float) -> str:

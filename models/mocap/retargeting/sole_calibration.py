@@ -155,6 +155,6 @@ def _sole_normal(vertical: Array, neutral: Array, least: int) -> tuple[Array, in
     # Mean shift to the mode of the normals: a frame more or less of a rolling foot changes it little.
     normal = unit(vertical[used].mean(axis=0))
     for _ in range(_MEAN_SHIFT_COUNT):
-        closeness = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _NORMAL_TOLERANCE) ** 2) / 2.0)
-        normal = unit((closeness * likelihood) @ vertical)
+        nearness = np.exp(-((np.arccos(np.clip(vertical @ normal, -1.0, 1.0)) / _NORMAL_TOLERANCE) ** 2) / 2.0)
+        normal = unit((nearness * likelihood) @ vertical)
     return normal, int(used.sum())

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from sim.users.intents.intent import WISH_PERIOD, between, bump, centre, check, moments
-from sim.users.person.wishes import ENGAGED, GRIP, PLACE, Wishes, following, resting
+from sim.users.person.wishes import ENGAGED, GRIP, Wishes, following, resting
 
 
 @dataclass(frozen=True)
@@ -192,8 +192,6 @@ class Resist:
         """See `PersonIntent`."""
         t = moments(seconds)
         is_staying = (t >= self.at) & (t < self.at + self.seconds)
-        curve_time = t - np.clip(t - self.at, 0.0, self.seconds)
-        rows = following(curve.point(curve.start + curve_time))
-        rows[is_staying, PLACE : PLACE + 3] = curve.point(curve.start + self.at)
+        rows = following(curve.point(curve.start + np.minimum(t, np.maximum(self.at, t - self.seconds))))
         rows[is_staying, GRIP] = self.grip
         return Wishes(rows, WISH_PERIOD)

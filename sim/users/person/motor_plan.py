@@ -103,10 +103,10 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     set_submovement(person.plans[1], start, goal, seconds)
     scatter = n[MOTOR_NOISE] * length / seconds
     across = CROSS_SCATTER * scatter
-    along = math.sqrt(scatter * scatter - across * across) * normal(person.chance)
+    along = math.sqrt(scatter * scatter - across * across) * normal(person.rng)
     for k in range(3):
         unit = displacement[k] / length if length > 0.0 else 0.0
-        error = along * unit + across * normal(person.chance)
+        error = along * unit + across * normal(person.rng)
         end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + error
     start[0] = V[DRIVEN_P]
     set_submovement(person.plans[0], start, end, seconds)

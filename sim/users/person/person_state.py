@@ -24,7 +24,7 @@ target, degree of muscle activation, impedance relative to that at the reference
 hand was where the submovement had it [s]."""
 
 (HAND_P, HAND_V, DRIVEN_P, DRIVEN_V, DRIVEN_A, INTENDED, OFFSET, DRIFT, BLUR, BELIEF, WANTED_FORCE, REFLEX, UNSTEADY,
- TREMOR, TREMOR_BEFORE, FELT_FORCE, MISFELT, SHOWN, DIRECTION_ERROR, DIRECTION_ERROR_OFFSET,
+ TREMOR, TREMOR_BEFORE, FELT_FORCE, FELT_FORCE_ERROR, SHOWN, DIRECTION_ERROR, DIRECTION_ERROR_OFFSET,
  N_VECTORS) = range(21)  # fmt: skip
 """Rows of `PersonState.vectors`, in H: the hand's position and velocity; the motion that the muscles drive it to
 (position, velocity, acceleration); the displacement intended so far; the correction of the felt position by vision;
@@ -59,7 +59,7 @@ class PersonState(NamedTuple):
         Coefficients of the submovement as it is driven, and as she believes it, shape (2, 6, 3).
     learned : Array
         Learned forces [N] by part of a lap, shape (`LEARNED_PARTS`, 3).
-    chance : Array of uint64
+    rng : Array of uint64
         State of her random numbers.
     eye : Eye
         What she has learned of the figure, by which she interprets a pose.
@@ -77,7 +77,7 @@ class PersonState(NamedTuple):
     past: Array
     plans: Array
     learned: Array
-    chance: npt.NDArray[np.uint64]
+    rng: npt.NDArray[np.uint64]
     eye: Eye
 
 

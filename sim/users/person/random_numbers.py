@@ -16,7 +16,7 @@ _A, _B, _C, _SHIFT = np.uint64(12), np.uint64(25), np.uint64(27), np.uint64(11)
 _FACTOR = np.uint64(0x2545F4914F6CDD1D)
 
 
-def fresh_chance(seed: int) -> State:
+def initial_rng(seed: int) -> State:
     """State of a generator, shape (1,), from an integer seed ≥ 0, hashed by NumPy's `SeedSequence`."""
     state = np.random.SeedSequence(seed).generate_state(1, np.uint64)
     return np.maximum(state, np.uint64(1))  # a zero state would stay zero

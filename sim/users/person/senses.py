@@ -23,6 +23,7 @@ from sim.users.person.person_state import (
     DRIVEN_P,
     DRIVEN_V,
     FELT_FORCE,
+    FELT_FORCE_ERROR,
     FELT_FORCE_NOISE,
     FELT_NOISE,
     FORCE_NOISE,
@@ -31,7 +32,6 @@ from sim.users.person.person_state import (
     INTENDED,
     INTENT,
     LOOK_TICKS,
-    MISFELT,
     OFFSET,
     PERIOD,
     PRESSED,
@@ -59,8 +59,8 @@ DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 1
 BLUR_TIME = 0.2  # [s] correlation time of visual noise: a fixation
 CALIBRATION_TIME = 0.15  # [s] time constant with which vision corrects the felt position
 REJECTION_DISTANCE = 0.005  # [m] plus three times the felt noise: a place seen farther from the felt one is rejected
-VEER_TIME = 0.5  # [s] correlation time of the error of felt direction, without which the steering law does not hold
-ASTRAY_TIME = 0.5  # [s] time constant with which the position error caused by it decays
+ERROR_TIME = 0.5  # [s] correlation time of the error of felt direction, without which the steering law does not hold
+OFFSET_TIME = 0.5  # [s] time constant with which the position error caused by it decays
 UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (Jones et al. 2002, m)
 
 
@@ -73,7 +73,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
     _advance_noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
     _advance_noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
     if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
-        _advance_noise(person, MISFELT, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
+        _advance_noise(person, FELT_FORCE_ERROR, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
     tick = int(m[TICKS])
     now = past[tick % size]
@@ -90,7 +90,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
         V[OFFSET, k] = decay * V[OFFSET, k] + (1.0 - decay) * (seen[SEEN + k] - seen[SENSED + k])
         V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
-        V[FELT_FORCE, k] = (1.0 + V[MISFELT, k]) * felt[PRESSED + k]
+        V[FELT_FORCE, k] = (1.0 + V[FELT_FORCE_ERROR, k]) * felt[PRESSED + k]
     for k in range(3):
         V[REFLEX, k] = 0.0
         for j in range(3):
@@ -98,7 +98,7 @@ def sense(person: PersonState, p: Array, force: Array) -> None:
         V[REFLEX, k] *= n[REFLEX_GAIN]
     tremor_gain = n[TREMOR_GAIN]
     for k in range(3):
-        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.chance)
+        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.rng)
         V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], tremor
     m[TICKS] += 1.0
 
@@ -109,7 +109,7 @@ def _advance_noise(person: PersonState, which: int, deviation: float, seconds: f
     decay = math.exp(-person.numbers[PERIOD] / seconds)
     noise_gain = deviation * math.sqrt(1.0 - decay * decay)
     for k in range(3):
-        person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.chance)
+        person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.rng)
 
 
 @njit
@@ -121,13 +121,13 @@ def advance_direction_error(person: PersonState) -> None:
     with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
     (Gordon, Ghilardi & Ghez 1994 I).
     """
-    _advance_noise(person, DIRECTION_ERROR, person.numbers[DIRECTION_NOISE], VEER_TIME)
+    _advance_noise(person, DIRECTION_ERROR, person.numbers[DIRECTION_NOISE], ERROR_TIME)
     V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[DIRECTION_ERROR]
     period = person.numbers[PERIOD]
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         V[DIRECTION_ERROR_OFFSET, k] += period * (
-            angle[i] * v[j] - angle[j] * v[i] - V[DIRECTION_ERROR_OFFSET, k] / ASTRAY_TIME
+            angle[i] * v[j] - angle[j] * v[i] - V[DIRECTION_ERROR_OFFSET, k] / OFFSET_TIME
         )
 
 

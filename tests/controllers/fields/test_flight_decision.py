@@ -101,7 +101,7 @@ def test_led_figure_flies_only_at_flying_pace():
     assert speed[flown].max() <= 1.05 * RUN.speed
     # In flight it hardly accelerates.
     acceleration = np.abs(np.diff(speed)) / RATE
-    assert acceleration[held[1:] < 0.5].max() < 1.001 * WALKING.haste
+    assert acceleration[held[1:] < 0.5].max() < 1.001 * WALKING.flight_pull
     assert acceleration.max() == pytest.approx(WALKING.pull, rel=1e-3)
     # The blend changes smoothly with the argument.
     assert np.abs(np.diff(held)).max() < 0.012
@@ -111,7 +111,7 @@ def test_led_figure_flies_only_at_flying_pace():
     ("numbers", "message"),
     [
         ({"landing": 0.95}, "takes off at no lower pace"),
-        ({"haste": 0.0}, "haste"),
+        ({"flight_pull": 0.0}, "flight_pull"),
         ({"take_off": np.nan}, "take_off"),
     ],
 )

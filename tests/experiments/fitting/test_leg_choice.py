@@ -119,6 +119,6 @@ def test_trial_hand_covers_the_whole_map(
 def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
     assert trial_of(maps[1], LAP, False).is_sound()
     walk, run = trial_of(maps[1], LAP, False).verdict(), trial_of(maps[0], LAP, False).verdict()
-    assert walk.bearable
+    assert walk.acceptable
     assert run.worse() > walk.worse()
-    assert not run.bearable
+    assert not run.acceptable

@@ -91,25 +91,25 @@ def _made(falls: float | None, near: bool) -> Prepared:
 
 @pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
 def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
-    made = _made(falls, near=False)
-    looped = made.looped
-    eventful = losses(made._replace(looped=looped._replace(left_out=(1.2, 4.5))))
+    result = _made(falls, near=False)
+    looped = result.looped
+    eventful = losses(result._replace(looped=looped._replace(left_out=(1.2, 4.5))))
     assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful
-    lines = losses(made)
+    lines = losses(result)
     assert any("fall at 0.5 m/s², and would fall freely at" in line for line in lines) == named
     assert "the capture turns by 90°, at the cycle's rate by 6°: --loop open keeps its turns" in lines
-    assert not any("turns by" in line for line in losses(made._replace(looped=looped._replace(turns=(0.4, 0.1)))))
+    assert not any("turns by" in line for line in losses(result._replace(looped=looped._replace(turns=(0.4, 0.1)))))
 
 
 @pytest.mark.parametrize("near", [True, False])
 def test_lines_are_in_the_order_of_importance(near):
     """First falls and the lack of a feasible motion, then what can be seen, limits and distance, and advice last."""
-    made = _made(None, near)
-    sound = well_formed(made.clip, ())
+    result = _made(None, near)
+    sound = well_formed(result.clip, ())
     bent = replace(sound, excess=0.1, bent="left_knee", strain=1.2)
     faulty = replace(bent, residual=0.2, skate=0.02, depth=0.03, highest=0.02)
-    far = made.fidelity._replace(joints=0.2)
-    outcome = PreparedFile(made._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
+    far = result.fidelity._replace(joints=0.2)
+    outcome = PreparedFile(result._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
     first, *below = str(outcome).splitlines()
     assert first.endswith("; not well-formed")
     starts = [
@@ -124,8 +124,8 @@ def test_lines_are_in_the_order_of_importance(near):
 
 
 def test_a_well_formed_clip_has_one_line_and_what_it_lacks():
-    made = _made(None, near=True)
-    outcome = PreparedFile(made, well_formed(made.clip, ()), Followed(0.01, None, 20.0, 1.0), (), ())
+    result = _made(None, near=True)
+    outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01, None, 20.0, 1.0), (), ())
     first, lost = str(outcome).splitlines()
     assert first.endswith("; well-formed")
     assert lost.endswith(": --loop open keeps its turns")

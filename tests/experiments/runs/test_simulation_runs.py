@@ -34,6 +34,20 @@ def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
     assert last.values == {"field.k_r": 800}
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+def test_map_is_fitted_to_a_field_with_its_flow(parallel: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by `hvf run`: run, cheer and ginga fall in one flow, and stand with half of the arms in the other."""
+
+    def make_parts(*arguments: object) -> None:
+        raise hvf.ParameterError(f"fitted to {arguments[-1]}")
+
+    monkeypatch.setattr(hvf.Composite, "make_parts", staticmethod(make_parts))
+    curve = hvf.circle(lap=2.0)
+    field = hvf.Follow(curve, k_r=300, b_d=8, parallel=parallel).limited(8.0)
+    with pytest.raises(hvf.ParameterError, match=f"fitted to {parallel}"):
+        hvf.Simulation(field=field, haptic_map=hvf.Composite(hvf.clips("walk"), around=curve)).session(1.0)
+
+
 def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
     values = [sim, sim.field, sim.haptic_map, run, run.ticks, hvf.circle(), hvf.clips("walk")[0], hvf.persona("median")]
     for value in values:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from controllers.errors import ParameterError
+from experiments.config.options import run_config
 from experiments.config.part import to_json
 from experiments.results.measures import smoothness
 from experiments.trials.design.study_config import StudyError
@@ -15,6 +16,7 @@ from experiments.trials.study import DATABASE, REPORT, SUMMARY, Study
 from experiments.trials.trial import run_trial
 from experiments.trials.trial.run_trial import MapCache, Row, Task, perform_trial
 from sim.compilation.sources import reached_code
+from sim.recording.recorder import DiskFull
 from sim.recording.recording import Recording
 
 pandas = pytest.importorskip("pandas")
@@ -95,23 +97,34 @@ def test_measures_of_tracing_and_exaggerating_tasks() -> None:
         assert rows[task].measures[something] > 0.0
 
 
-def test_machine_error_is_raised_not_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), DiskFull("run.h5: No space left")])
+def test_machine_error_is_raised_not_recorded(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     trial = small_study().trials[0]
 
     def full(*_: object) -> Row:
-        raise OSError(28, "No space left on device")
+        raise error
 
     monkeypatch.setattr(run_trial, "_simulate", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(type(error), match="No space left"):
         perform_trial(Task(trial.key, to_json(trial.config)))
 
 
 def test_shared_maps_do_not_change_the_measures() -> None:
     trials = small_study().trials[:3]
-    shelf = MapCache()
-    shared = [perform_trial(Task(t.key, to_json(t.config)), shelf).measures for t in trials]
+    cache = MapCache()
+    shared = [perform_trial(Task(t.key, to_json(t.config)), cache).measures for t in trials]
     alone = [perform_trial(Task(t.key, to_json(t.config)), MapCache()).measures for t in trials]
     assert shared == alone
+
+
+def test_maps_are_shared_among_trials_whose_field_flows_alike() -> None:
+    """The legs of a map are chosen for hands that are pushed off as its field lets them move."""
+    keys = [
+        run_trial._map_key(run_config(map="composite", clips=("walk", "angry", "cheer"), **words))
+        for words in ({}, {"flow": "parallel"}, {"flow": "parallel", "damping": 9.0}, {"flow": "curve"})
+    ]
+    assert keys[0] == keys[1] == keys[2] != keys[3]
+    assert keys[3] == run_trial._map_key(run_config(mode="bunny", map="composite", clips=("walk", "angry", "cheer")))
 
 
 def test_recordings_are_stored_at_the_given_url(tmp_path: Path) -> None:

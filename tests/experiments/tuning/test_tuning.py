@@ -23,7 +23,7 @@ from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, storage_of, violation_of
-from experiments.tuning.tune import TunedSimulation
+from experiments.tuning.tune import TunedSimulation, _study_name
 from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning
 
@@ -225,6 +225,35 @@ def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     assert cached_stability(config_of_run).verdict == "certified"
     assert {c.contender for c in found.comparisons} == {"defaults", "random search", "half the critical gain"}
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_name_of_a_search_depends_on_all_that_its_cost_depends_on() -> None:
+    curve, scale = hvf.circle(lap=2.0), 1.0
+
+    def name(
+        user: hvf.User | None = None, kind: str = "none", clips: tuple[str, ...] = ("walk",), seed: int = 1,
+        cost: Callable[[hvf.Run], float] = lambda run: 1.0,
+    ) -> str:  # fmt: skip
+        sim = hvf.Simulation(
+            field=hvf.Follow(curve, k_r=300, b_d=8), haptic_map=hvf.Cylindrical(hvf.clips(*clips), around=curve),
+            figure=hvf.Figure(kind=kind),
+        )  # fmt: skip
+        users = (user or hvf.User(), *(hvf.User(person=person) for person in hvf.population(2, seed=seed)))
+        return _study_name(sim, {"field.k_r": (100.0, 200.0)}, cost, users, 1.0, hvf.Search())
+
+    def own(t: float, place: object, force: object) -> tuple[float, float, float]:
+        return scale, 0.0, 0.0
+
+    intent = hvf.User(person=hvf.persona("median"), intent=hvf.intents.Own(own))
+    costs = (lambda run: sum(abs(x) for x in run.ticks["t"]), lambda run: sum(x * x for x in run.ticks["t"]))
+    names = [
+        name(), name(hvf.User(pushes=[hvf.Push(0.1, 0.2, 1.0)])), name(intent), name(kind="kinematic"),
+        name(clips=("run",)), name(seed=2), *(name(cost=cost) for cost in costs),
+    ]  # fmt: skip
+    assert len(set(names)) == len(names)
+    assert names[:3] == [name(), name(hvf.User(pushes=[hvf.Push(0.1, 0.2, 1.0)])), name(intent)]
+    scale = 2.0
+    assert name(intent) != names[2]
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """A recording keeps all data, also of a killed run, and never overwrites another."""
 
-import json
 import random
 import re
 import shutil
@@ -8,45 +7,12 @@ import subprocess
 import sys
 import time
 
-import h5py
 import numpy as np
 import pytest
 
 from sim.recording.recorder import CHUNK_SECONDS, PAGE_SIZE, DiskFull, Group, Recorder
 from sim.recording.recording import Recording, RecordingError
-from sim.recording.unclosed import lookup3
-
-CHANNELS = {"t": (), "p": (3,), "applied": (2, 3)}
-GROUPS = {"ticks": Group(1000.0, CHANNELS), "frames": Group(100.0, {"t": ()})}
-
-# Writes rows that hold their own number, and prints after each block how many there are.
-WRITER = """
-import sys
-from pathlib import Path
-import numpy as np
-from sim.recording.recorder import Group, Recorder
-channels = {"t": (), "p": (3,), "applied": (2, 3)}
-recorder = Recorder(Path(sys.argv[1]), {}, 1, {"ticks": Group(1000.0, channels)}, {"xml": "x" * 300000})
-n = 0
-while True:
-    rows = np.arange(n, n + 20.0)
-    blocks = {k: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (20, *s)) for k, s in channels.items()}
-    recorder.append("ticks", blocks)
-    n += 20
-    print(n, flush=True)
-    if n == int(sys.argv[2]):
-        recorder.close({"text": "y" * 20000})
-"""
-
-
-def block(start: int, n: int) -> dict[str, np.ndarray]:
-    rows = np.arange(start, start + n, dtype=float)
-    return {name: np.broadcast_to(rows.reshape(-1, *[1] * len(s)), (n, *s)) for name, s in CHANNELS.items()}
-
-
-def holds_row_numbers(channel) -> bool:
-    rows = channel[:]
-    return bool(np.all(rows == np.arange(len(rows)).reshape(-1, *[1] * (rows.ndim - 1))))
+from tests.sim.recording.row_numbers import GROUPS, WRITER, block, holds_row_numbers
 
 
 def test_everything_written_is_read_back_bit_for_bit(tmp_path):
@@ -167,35 +133,6 @@ def test_exception_keeps_all_rows_and_marks_the_recording_incomplete(tmp_path):
         assert recording.summary is None
 
 
-def test_rows_beyond_the_row_count_are_not_read(tmp_path):
-    path = tmp_path / "run.h5"
-    with Recorder(path, {}, 1, GROUPS, {}) as recorder:
-        recorder.append("ticks", block(0, 500))
-    with h5py.File(path, "r+") as file:
-        file["ticks/p"].resize(900, axis=0)
-    with Recording(path) as recording:
-        assert recording.groups["ticks"]["p"].shape == (500, 3)
-
-
-@pytest.mark.parametrize(
-    ("alter", "message"),
-    [
-        (lambda file: file["ticks/p"].resize(100, axis=0), r"ticks/p has 100 rows, ticks/rows says 500"),
-        (lambda file: file["ticks/p"].resize(900, axis=0), r"ticks/p has 900 rows, ticks/rows says 500"),
-        (lambda file: file["ticks/rows"].__setitem__(0, 501), r"ticks/\w+ has 500 rows, ticks/rows says 501"),
-    ],
-)
-def test_complete_recording_with_inconsistent_channel_lengths_is_damaged(tmp_path, alter, message):
-    path = tmp_path / "run.h5"
-    with Recorder(path, {}, 1, GROUPS, {}) as recorder:
-        recorder.append("ticks", block(0, 500))
-        recorder.close({"rms": 0.1})
-    with h5py.File(path, "r+") as file:
-        alter(file)
-    with pytest.raises(RecordingError, match=rf"run\.h5: not a recording, or damaged \({message}\); expected"):
-        Recording(path)
-
-
 def test_running_recording_is_readable(tmp_path):
     with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder:
         recorder.append("ticks", block(0, 600))
@@ -277,77 +214,6 @@ def test_group_without_rate_or_channels_is_refused(rate, channels):
         Group(rate, channels)
 
 
-def test_error_for_a_missing_channel_names_the_recorded_ones(tmp_path):
-    with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {"curve": [1.0]}) as recorder:
-        recorder.append("ticks", block(0, 5))
-    with Recording(tmp_path / "run.h5") as recording:
-        assert len(recording.channel("ticks", "p")) == 5
-        assert recording.arrays["curve"] == [1.0]
-        with pytest.raises(RecordingError, match=r"no channel ticks/q; there are \['applied', 'p', 't'\]"):
-            recording.channel("ticks", "q")
-        with pytest.raises(RecordingError, match=r"no group pings; there are \['frames', 'ticks'\]"):
-            recording.channel("pings", "q")
-        with pytest.raises(RecordingError, match=r"frames/t has no rows"):
-            recording.channel("frames", "t")
-        with pytest.raises(RecordingError, match=r"no array tube; there are \['curve'\]"):
-            recording.arrays["tube"]
-        with pytest.raises(RecordingError, match=r"no text title; there are \[\]"):
-            recording.texts["title"]
-        with pytest.raises(RecordingError, match=r"run\.h5: no array or text river; there are \['curve'\]"):
-            recording.static["river"]
-        with pytest.raises(RecordingError, match=r"run\.h5: no channel ticks/q; there are"):
-            recording.groups["ticks"]["q"]
-
-
-def recording_bytes(path, closed=True):
-    """A recording of a second, closed or as a kill leaves it."""
-    script = WRITER if closed else WRITER.replace("recorder.close", "import os; os._exit")
-    subprocess.run([sys.executable, "-c", script, str(path), "1000"], stdout=subprocess.PIPE, check=False, timeout=60)
-    return path.read_bytes()
-
-
-def damaged(content):
-    """Thirty bytes of a run cut somewhere, and thirty with bits turned over."""
-    rng = random.Random(3)
-    for _ in range(30):
-        yield content[: rng.randrange(1, len(content))]
-    for k in range(30):
-        spoiled = bytearray(content)
-        for _ in range(1 + k):
-            spoiled[rng.randrange(len(spoiled) if k % 2 else 8000)] ^= 1 << rng.randrange(8)
-        yield bytes(spoiled)
-
-
-@pytest.mark.parametrize("closed", [True, False])
-def test_truncated_or_corrupt_file_is_read_or_refused_without_hanging(tmp_path, closed):
-    content = recording_bytes(tmp_path / "whole.h5", closed)
-    refused, began = list[str](), time.perf_counter()
-    for k, bytes_of in enumerate(damaged(content)):
-        path = tmp_path / f"{k}.h5"
-        path.write_bytes(bytes_of)
-        try:
-            with Recording(path) as recording:
-                for channel in recording.groups["ticks"].values():
-                    assert len(channel[:]) == len(channel)
-        except RecordingError as error:
-            refused.append(str(error))
-    assert len(refused) > 30
-    assert not [message for message in refused if "\n" in message]
-    assert time.perf_counter() - began < 30.0  # HDF5 alone would hang
-
-
-def test_error_for_a_truncated_file_names_both_sizes(tmp_path):
-    content = recording_bytes(tmp_path / "run.h5")
-    (tmp_path / "run.h5").write_bytes(content[:20000])
-    with pytest.raises(RecordingError, match=rf"run\.h5: .*cut short: 20000 bytes of {len(content)}; expected"):
-        Recording(tmp_path / "run.h5")
-
-
-def test_lookup3_hash_equals_published_values():
-    assert lookup3(b"Four score and seven years ago") == 0x17770551  # from lookup3.c itself
-    assert lookup3(b"") == 0xDEADBEEF
-
-
 def test_full_disk_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_path, monkeypatch):
     free_bytes = [10e6]
 
@@ -397,13 +263,3 @@ def test_file_size_limit_ends_the_run_with_one_line_and_keeps_recorded_rows(tmp_
         rows = recording.channel("ticks", "x")
         assert len(rows) >= 500
         assert holds_row_numbers(rows)
-
-
-def test_file_that_is_no_recording_is_refused_in_one_line(tmp_path):
-    (tmp_path / "text.h5").write_text("no HDF5")
-    with h5py.File(tmp_path / "other.h5", "w", libver="latest") as file:
-        file["config"] = json.dumps({})
-    for name in ("missing.h5", "text.h5", "other.h5"):
-        with pytest.raises(RecordingError, match=rf"{name}: .*expected the run\.h5 of a run") as caught:
-            Recording(tmp_path / name)
-        assert "\n" not in str(caught.value)

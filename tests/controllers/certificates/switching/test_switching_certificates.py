@@ -166,7 +166,7 @@ def test_smooth_form_throws_the_hand_out_at_a_shallow_crossing():
     assert found
     verdict = switching(_both_retentions(field), 0.0, 5.0, found, None)
     assert verdict.verdict == "refuted"
-    # The mismatch tolerance leaves the rival most of its weight here and none at a right angle.
+    # The mismatch tolerance leaves the competing river most of its weight here and none at a right angle.
     assert verdict.figures["rival_weight"] > 0.5
     steep = switching(_both_retentions(straight_pair(90.0, "smooth", 0.15)), 0.0, 5.0, {}, None)
     assert steep.figures["rival_weight"] < 1e-6

@@ -181,6 +181,19 @@ def test_code_digest_depends_on_closure_constants_and_functions():
     assert len({digest(1.0, 2.0), digest(1.5, 2.0), digest(1.0, 2.5)}) == 3
 
 
+@pytest.mark.parametrize(
+    "body",
+    ["return [gain * x for x in hand.p]", "return list(map(lambda x: gain * x, hand.p))", "return helper(hand)"],
+)
+def test_code_digest_depends_on_globals_read_within_and_on_keyword_defaults(body):
+    def digest(gain):
+        names = {"gain": gain}
+        exec(f"def helper(hand, *, k={gain}):\n    return [k * x for x in hand.p]\ndef own(hand):\n    {body}", names)
+        return code_digest(names["own"])
+
+    assert digest(1.0) == digest(1.0) != digest(2.0)
+
+
 def test_code_digest_depends_on_container_contents_and_differs_for_unreadable_objects():
     gains, table = [1.0], {"k": np.array([1.0, 2.0])}
 

@@ -177,7 +177,7 @@ def test_any_axes_and_any_unit_give_the_same_clip(mocap, axis_turn):
     np.testing.assert_allclose(pose_difference(clip.poses, clip_of_other.poses), 0.0, atol=1e-9)
     assert report_of_other.scale == pytest.approx(report.scale / 100)
     sign, axis = np.sign(axis_turn.apply([0, 1, 0]).sum()), int(np.argmax(np.abs(axis_turn.apply([0, 1, 0]))))
-    assert report_of_other.up == f"{'+' if sign > 0 else '−'}{'XYZ'[axis]}"
+    assert report_of_other.up == f"{'+' if sign > 0 else '-'}{'XYZ'[axis]}"
 
 
 def test_foreign_joints_are_listed_as_unused_and_take_no_role(mocap):

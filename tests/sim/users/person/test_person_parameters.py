@@ -10,7 +10,7 @@ from sim.users.participant import Participant, tremor_filter
 from sim.users.person.body import arm_matrices, check_steps
 from sim.users.person.person import INTERVALS, Person
 from sim.users.person.population import PERSONAS, persona, population
-from sim.users.person.random_numbers import fresh_chance, normal, uniform
+from sim.users.person.random_numbers import initial_rng, normal, uniform
 
 
 def test_every_parameter_of_a_person_has_an_interval_with_a_source() -> None:
@@ -79,7 +79,7 @@ def test_steps_too_long_for_the_person_are_refused() -> None:
 
 
 def test_random_numbers_are_uniform_normal_and_reproducible() -> None:
-    state, again = fresh_chance(5), fresh_chance(5)
+    state, again = initial_rng(5), initial_rng(5)
     drawn = np.array([normal(state) for _ in range(20_000)])
     np.testing.assert_array_equal(drawn[:50], [normal(again) for _ in range(50)])
     assert abs(drawn.mean()) < 0.03

@@ -27,7 +27,7 @@ from sim.users.person.person_state import (
     PersonState,
 )
 from sim.users.person.person_step import link_person
-from sim.users.person.senses import ASTRAY_TIME, VEER_TIME, advance_direction_error
+from sim.users.person.senses import ERROR_TIME, OFFSET_TIME, advance_direction_error
 from sim.users.person.wishes import ENGAGED, OWN, Wishes, following, resting
 from sim.world.phantom_port import phantom_port
 from tests.sim.bare_servos import CUTOFF, START, bare_servo, device_world, simulated
@@ -124,7 +124,7 @@ def test_direction_error_has_the_variance_of_filtered_noise() -> None:
     person.vectors[HAND_V] = 0.0, speed, 0.0
     _direction_errors(person, directions)
     # An Ornstein-Uhlenbeck process of time τ behind a filter of time T: σ² v² T² τ / (T + τ), none along the motion.
-    variance = (Person().direction_noise * speed * ASTRAY_TIME) ** 2 * VEER_TIME / (ASTRAY_TIME + VEER_TIME)
+    variance = (Person().direction_noise * speed * OFFSET_TIME) ** 2 * ERROR_TIME / (OFFSET_TIME + ERROR_TIME)
     np.testing.assert_allclose(directions.std(axis=0), [variance**0.5, 0.0, variance**0.5], rtol=0.08, atol=1e-9)
     assert abs(np.mean(directions[:, 0] * directions[:, 2])) < 0.1 * variance
 
