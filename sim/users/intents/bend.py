@@ -43,15 +43,16 @@ class Bend:
         t, grabs = moments(seconds), sorted(self.grabs, key=lambda grab: grab.at)
         rows = resting(len(t))
         # A person plans ahead of her clock, by the place's velocity and acceleration: it moves smoothly all the time.
-        left, place, path = 0.0, np.array(grabs[0].place), np.zeros((len(t), 3)) + grabs[0].place
+        left, place = 0.0, np.array(grabs[0].place)
+        path = np.tile(place, (len(t), 1))
         for grab in grabs:
-            grip_start, carry = grab.at + grab.reach, np.array(grab.carry)
+            grip_start, reached, carry = grab.at + grab.reach, np.array(grab.place), np.array(grab.carry)
             arrived = between(t, left, max(grab.at, left + grab.reach))
             carried = between(t, grip_start, grip_start + grab.seconds)
-            path += arrived[:, None] * (grab.place - place) + carried[:, None] * carry
+            path += arrived[:, None] * (reached - place) + carried[:, None] * carry
             is_busy = (t >= grab.at) & (t < grab.end)
             rows[is_busy, ENGAGED] = 1.0
             rows[is_busy & (t >= grip_start), SWITCH] = 1.0
-            left, place = grab.end, grab.place + carry
+            left, place = grab.end, reached + carry
         rows[:, PLACE : PLACE + 3] = path
         return Wishes(rows, WISH_PERIOD)
