@@ -166,7 +166,7 @@ def lap_remark(clip: Clip, figure: FigureKind) -> tuple[str, ...]:
         remarks.append(
             f"the clip {clip.name!r} is no steady gait: for {100 * slow:.0f} % of its lap it has less than "
             f"{_SLOW_SPEED} of its mean speed, and the hand hardly moves it there"
-            + (", elsewhere the physical figure may fall" if figure == "physical" else "")
+            + ("; elsewhere the physical figure may fall" if figure == "physical" else "")
         )
     return tuple(remarks)
 
