@@ -87,8 +87,9 @@ def test_rubber_pulls_the_hand_back(stretch_run) -> None:
 def test_figure_shows_the_animation_at_the_held_point(stretch_run) -> None:
     session, _, recorded = stretch_run
     last = np.flatnonzero(recorded["switch"] > 0.0)[-1]
-    points = np.array([recorded["p"][last], session.curve.point(0.5)])
-    poses = map_poses(session.haptic_map, stylus_path(points))
+    # Along the path of the hand, since feet in stance keep their places while the mixture changes.
+    held = map_poses(session.haptic_map, stylus_path(recorded["p"][: last + 1]))[-1]
+    poses = held, map_poses(session.haptic_map, stylus_path(session.curve.point(0.5)[None]))[0]
     frame = int(last // session.servo.figure_ticks)
     under_held_point, before_bending = (
         np.abs(pose_difference(recorded["shown"][frame : frame + 1], pose[None])[0, 6:]) for pose in poses
