@@ -43,7 +43,8 @@ def scaled(wanted: Array, pace: Array, rectangle: Rectangle) -> Array:
     values, vectors = np.linalg.eigh(-0.5 * centre @ wanted**2 @ centre)
     plane = np.zeros((n, 2))
     plane[:, : min(n, 2)] = (vectors * np.sqrt(np.maximum(values, 0.0)))[:, ::-1][:, :2]
-    plane *= np.where(plane.sum(axis=0) < 0.0, -1.0, 1.0)
+    # The signs of eigenvectors are those of the processor's rounding.
+    plane *= np.where(plane[np.abs(plane).argmax(axis=0), [0, 1]] < 0.0, -1.0, 1.0)
     lead = (pace - pace.mean()) / max(float(pace.std()), 1e-9) if n > 1 else np.zeros(n)
     best, least = np.tile(middle, (n, 1)), np.inf
     for angle in np.linspace(0.0, 2.0 * np.pi, 36, endpoint=False):
