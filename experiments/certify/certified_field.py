@@ -22,6 +22,7 @@ from experiments.files.certificate_files import code_inputs
 from experiments.files.device_files import linkage_of
 from experiments.setups.certified_law import certified_laws, governor_drag, leading_gains, uncertified_parts
 from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.lap import circle_of
 from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 
@@ -62,13 +63,13 @@ def _lead_curve(part: Led, retime: _Retiming) -> dict[str, Trajectory]:
 
 
 def _circle(part: Cylindrical | Composite | RiverClips | MapFile, retime: _Retiming) -> dict[str, Trajectory]:
-    return {"": retime(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave))}
+    return {"": retime(circle_of(part))}
 
 
 def _tilted_circle(part: RobotArm, retime: _Retiming) -> dict[str, Trajectory]:
     from experiments.setups.maps.robot_arm import tilted
 
-    return {"": retime(tilted(Trajectory.circle(part.around.radius, part.around.lap, wave=part.around.wave)))}
+    return {"": retime(tilted(circle_of(part)))}
 
 
 def _curves_of_file(part: MapFile, retime: _Retiming) -> dict[str, Trajectory]:

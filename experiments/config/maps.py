@@ -13,15 +13,16 @@ class Circle:
 
     Parameters
     ----------
-    lap : float
-        Time of a lap [s]; in less than a tenth of a second no hand completes one.
+    lap : float, optional
+        Time of a lap [s]; in less than a tenth of a second no hand completes one. By default 4 s, or, if the map plays
+        motion files, the lap in which its clips play nearest to their own pace.
     radius : float
         Radius of the circle [m].
     wave : float
         How far it goes up and down, three times a lap, so that every joint of the device turns [m].
     """
 
-    lap: float = at_least(0.1, default=4.0, unit="s")
+    lap: float | None = at_least(0.1, default=None, unit="s")
     radius: float = above(0.0, default=0.0477, unit="m")
     wave: float = at_least(0.0, default=0.0, unit="m")
 

@@ -19,6 +19,7 @@ MIN_FLYING_PACE, MAX_FLYING_PACE = 0.9, 1.1  # the same for clips with flights, 
 MIN_PACE, MAX_PACE = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
 # [rad] a joint that turns farther from its zero goes round, as in 7 of 143 prepared captures: a fault of the capture
 _MAX_JOINT_TURN = np.deg2rad(240.0)
+_MAX_ROUND_LAP = 6.0  # [s] of a lap in a round: in slower rivers a push hardly moves a hand to another one
 _LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natural_lap` takes the shortest of them
 
 
@@ -102,17 +103,28 @@ def with_loop_first(first: int, loops: Sequence[Loop]) -> list[Loop]:
     return [loops[first], *loops[:first], *loops[first + 1 :]]
 
 
-def off_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int, timing: int) -> tuple[str, ...]:
+def best_lap(clips: Sequence[Clip], timing: int, in_rounds: bool) -> float:
+    """Duration of a lap [s] in which the clip of index `timing` plays at its own pace, and the others nearly so.
+
+    `in_rounds` says whether the clips may be played in rounds of several laps; long laps are then divided.
+    """
+    lap = natural_lap(with_loop_first(timing, closed_loops(clips)))
+    return round(lap / np.ceil(lap / _MAX_ROUND_LAP) if in_rounds else lap, 6)
+
+
+def off_pace(
+    clips: Sequence[Clip], loops: Sequence[Loop], lap: float, laps: int, timing: int, in_rounds: bool = False
+) -> tuple[str, ...]:
     """Remark on clips that laps [s] play much faster or slower than their own pace, as loops made by `fit_to_lap`.
 
     `laps` is the number of laps in a round, in which each loop is played once; `timing` is the index of the clip whose
-    pace an advised lap keeps.
+    pace an advised lap keeps, `in_rounds` as in `best_lap`.
     """
     paces = {clip.name: loop.duration / (laps * lap) for clip, loop in zip(clips, loops, strict=True)}
     outside = [f"{name} at {pace:.2f}" for name, pace in paces.items() if not MIN_PACE <= pace <= MAX_PACE]
     if not outside:
         return ()
-    best = natural_lap(with_loop_first(timing, closed_loops(clips)))
+    best = best_lap(clips, timing, in_rounds)
     better = (
         f"--lap {best:.1f} suits them best"
         if abs(best / lap - 1.0) > _LAP_TOLERANCE

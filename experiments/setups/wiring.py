@@ -19,6 +19,7 @@ from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.devices import DeviceOf, device_of
 from experiments.setups.parts.eyes import N_POSES, with_eyes
 from experiments.setups.parts.hands import Beginning, beginning
+from experiments.setups.parts.lap import lap_remarks
 from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
@@ -83,7 +84,7 @@ def wire(
     HvfError
         If a number is out of its interval, the rates do not divide, or the curve leaves the workspace.
     """
-    config = resolved(config)
+    given, config = config, resolved(config)
     check_seconds(config, config.seconds)
     check_rates(config)
     world = World(config.scene, config.body)
@@ -91,7 +92,7 @@ def wire(
         raise ParameterError(LEAD_WITHOUT_FIGURE)  # with a real device, the walker is led even without a figure
     if device is None:
         device = device_of(config, world, config.seconds)
-    maps = maps_of(config, world.body, clips)
+    maps = maps_of(config, world.body, clips).with_remarks(lap_remarks(given.map, config.map))
     return wire_parts(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
 

@@ -34,6 +34,7 @@ from experiments.setups.modes.rivers import (
     river_time,
 )
 from experiments.setups.parts.defaults import river_gains
+from experiments.setups.parts.lap import DEFAULT_LAP
 from experiments.studies.field_figures import SPEED, straight_river
 from geometry.arrays import Array
 from models.world.scene import SceneConfig
@@ -170,7 +171,7 @@ def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
 
     They are pushed up where the wave rises through the level river, or down where it falls.
     """
-    curve = Trajectory.circle(Circle().radius, Circle().lap)
+    curve = Trajectory.circle(Circle().radius, DEFAULT_LAP)
     program, changed, out = law_of(mode, default_choice(mode, curve, Cylindrical().reach)).program(), 0, 0
     pushes = [(up, lead, lasts) for up in (1.0, -1.0) for lead in PUSH_LEADS for lasts in PUSH_DURATIONS]
     for up, lead, lasts in pushes:

@@ -21,10 +21,9 @@ import numpy as np
 
 from controllers.haptic_map.lifting.room import Room
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import natural_lap
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import not_blendable, off_pace, timing_clip, with_loop_first
+from experiments.fitting.blendable import best_lap, not_blendable, off_pace, timing_clip
 from experiments.fitting.verdict import motion_of
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
@@ -54,7 +53,6 @@ JUDGING = (
 
 RUN_SECONDS = 20.0  # [s] of a run
 MAX_SOLO_RESIDUAL = 0.15  # [body weights] RMS residual of a clip followed alone, above which it is not well-formed
-MAX_LAP = 6.0  # [s] of rivers: in slower ones a push hardly moves a hand to another river
 _STRIDE = 5  # every fifth frame of the animation is measured: 100 a second
 
 
@@ -100,7 +98,7 @@ def _rest_clip(clip: Clip) -> Clip:
 def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
     """Run a set on a map of a kind at the lap that suits it best, and measure animation and figure.
 
-    On rivers, a longer lap is divided into laps of 6 s at most. On a lifted map the hand follows the curve of the first
+    On a lifted map the hand follows the curve of the first
     clip, at that clip's pace.
     """
     began = time.process_time()
@@ -114,9 +112,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
-            lap = natural_lap(with_loop_first(timing, loops))
-            if kind == "rivers":
-                lap /= np.ceil(lap / MAX_LAP)
+            lap = best_lap(clips, timing, kind == "rivers")
             words = dict[str, Any](map=kind, clips=names, lap=lap)
         config = run_config(mode=mode, user=user, seconds=RUN_SECONDS, seed=seed, **words)
         session = wire(config, tuple(clips))
@@ -135,7 +131,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
         "share": getattr(session.parts.maps.haptic_map, "share", None),
         "remarks": session.remarks, "fell": fell,
-        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing),
+        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing, kind == "rivers"),
         "residual": rms(force), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,

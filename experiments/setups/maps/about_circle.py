@@ -13,6 +13,7 @@ from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
 from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendable, off_pace, same, timing_clip
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.lap import circle_of
 from experiments.setups.parts.pace import check_reach, course_of
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
@@ -51,23 +52,21 @@ class Place(NamedTuple):
 
 def place_of(part: Cylindrical | Composite | RiverClips | MapFile) -> Place:
     """The place of a configured map; raises `SimError` if the Phantom does not reach its curve."""
-    around = part.around
-    curve = check_reach(Trajectory.circle(around.radius, around.lap, wave=around.wave))
-    return Place(curve, around.radius, part.reach, part.expressive)
+    return Place(check_reach(circle_of(part)), part.around.radius, part.reach, part.expressive)
 
 
 def about_circle(
-    place: Place, haptic_map: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None
+    place: Place, haptic_map: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None, in_rounds: bool = False
 ) -> ClipMapParts:
     """Map parts of a map of clips about a circle.
 
     `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights
-    (`timing_clip`).
+    (`timing_clip`); `in_rounds` says whether the clips may be played in rounds of several laps.
     """
     curve, reach = place.curve, place.reach
     played = [clips[i % len(clips)] for i in range(len(haptic_map.loops))]
     timing = timing_clip(clips) if timing is None else timing
-    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing)
+    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing, in_rounds)
     return ClipMapParts(
         haptic_map=haptic_map, clips=clips, curve=curve, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),

@@ -26,6 +26,7 @@ from experiments.setups.modes.lifted_runs import (
     lifted_choice,
     lifted_curve,
 )
+from experiments.setups.parts.lap import DEFAULT_LAP
 from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
@@ -44,7 +45,7 @@ def map_file_setup(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], fi
     path = Path(part.file)
     haptic_map, clips = load_figure_map(path)
     if isinstance(haptic_map, Lifted):
-        if part.around != Circle():
+        if part.around not in (Circle(), Circle(lap=DEFAULT_LAP)):
             raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
         parts = lifted_parts(haptic_map, clips, part)
         pushed = config.user.does == "push" and config.figure.kind == "physical"

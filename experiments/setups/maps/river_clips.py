@@ -43,7 +43,8 @@ def river_clips_setup(
     haptic_map = RiverClipsMap(
         curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
-    parts, names = about_circle(place, haptic_map, clips), [clips[i % len(clips)].name for i in range(3)]
+    parts = about_circle(place, haptic_map, clips, in_rounds=True)
+    names = [clips[i % len(clips)].name for i in range(3)]
 
     def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
         ready = with_rests(haptic_map, figure)

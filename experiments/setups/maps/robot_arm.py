@@ -14,6 +14,7 @@ from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
 from experiments.config.maps import RobotArm
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
+from experiments.setups.parts.lap import circle_of
 from experiments.setups.parts.pace import check_reach, course_of
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
@@ -34,10 +35,7 @@ _CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
 
 def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
     """Map parts of a configured robot arm, along a tilted circle."""
-    around = part.around
-    return arm_parts(
-        arm, tilted(Trajectory.circle(around.radius, around.lap, wave=around.wave)), part.reach, part.scale
-    )
+    return arm_parts(arm, tilted(circle_of(part)), part.reach, part.scale)
 
 
 def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:

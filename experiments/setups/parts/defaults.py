@@ -1,7 +1,4 @@
-"""Gains and flow of a mode that the configuration leaves open: they depend on the kind of map.
-
-Imports only configurations, since certificates import it too.
-"""
+"""What a configuration leaves open: gains and flow of a mode, which depend on the kind of map, and the lap."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,6 +6,7 @@ from dataclasses import replace
 from experiments.config.maps import Composite, MapFile
 from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow, StretchyTube
 from experiments.config.run_config import RunConfig
+from experiments.setups.parts.lap import with_lap
 
 # Rivers of a map from a file lie side by side. A larger τ = b_d/k_r draws a hand over from one to the other more
 # slowly; otherwise the figure would have to reach the other clip's speed at once.
@@ -41,10 +39,16 @@ _DEFAULTS_BY_MAP: Mapping[type, _ModeDefaults] = {
 
 
 def resolved(config: RunConfig) -> RunConfig:
-    """A configuration with the gains and the flow that it leaves open filled in."""
+    """A configuration with the gains, the flow and the lap that it leaves open filled in.
+
+    Raises
+    ------
+    HvfError
+        As `with_lap`.
+    """
     values = _DEFAULTS_BY_MAP.get(type(config.map), _CIRCLE_DEFAULTS).get(type(config.mode), {})
     missing = {name: value for name, value in values.items() if getattr(config.mode, name) is None}
-    return replace(config, mode=replace(config.mode, **missing))
+    return replace(config, map=with_lap(config.map), mode=replace(config.mode, **missing))
 
 
 def river_gains(mode: Rivers) -> tuple[float, float]:
