@@ -85,12 +85,12 @@ def trial_key(config: RunConfig) -> str:
 
 
 @cache
-def code_hash() -> str:
-    """Hash of the code that a trial reaches, and of the versions of Python and the libraries, 16 hex digits.
+def code_hash(module: str = _TRIAL_MODULE) -> str:
+    """Hash of the code that a trial, or another module, reaches, and of Python and the libraries, 16 hex digits.
 
     Analysis and plots of a study are not included; nor is the processor, which a row names separately.
     """
-    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(_TRIAL_MODULE).items())]
+    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(module).items())]
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
