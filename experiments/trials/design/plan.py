@@ -79,9 +79,8 @@ def trial_key(config: RunConfig) -> str:
     StudyError
         If a file that it names does not exist.
     """
-    text = to_json(resolved(config))
-    files = [f"{name} {file_digest(name)}" for name in files_of(config)]
-    return hashlib.sha256("\n".join([code_hash(), text, *files]).encode()).hexdigest()[:32]
+    files = [f"{name} {file_digest(name)}" for name in files_of(config)]  # first: refuses files that do not exist
+    return hashlib.sha256("\n".join([code_hash(), to_json(resolved(config)), *files]).encode()).hexdigest()[:32]
 
 
 @cache
