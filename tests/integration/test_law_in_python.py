@@ -5,8 +5,7 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from controllers.fields.own.own_law import law
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.own_law import PythonLaw, law
 from experiments.config.options import run_config
 from sim.errors import SimError
 from sim.loop.loop import Loop
