@@ -1,6 +1,5 @@
 """A robot arm of seven joints in place of the figure: the map's parts, for the same fields and the same loop."""
 
-from functools import cache, partial
 from typing import cast
 
 import mujoco
@@ -13,7 +12,7 @@ from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
-from experiments.setups.parts.pace import check_reach, course_of
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
@@ -78,7 +77,6 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
         haptic_map=cast(ClipMap, haptic_map), clips=(), curve=curve, reach=reach, turning=True, refined=refined,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
-        course=cache(partial(course_of, curve)),
         static={"tool_home": HOME + np.array([0.0, 0.0, PEDESTAL]), "tool_scale": scale},
     )  # fmt: skip
 

@@ -31,6 +31,7 @@ from experiments.setups.parts.hands import (
     turning_remark,
     user_hand,
 )
+from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
 from geometry.arrays import Array
 from models.mocap.dynamics.contacts import contacts
@@ -55,7 +56,7 @@ def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch-then-follow": FOLLOW on the bent curve once the last grab is over."""
-    course = maps.course(mode.damping, mode.stiffness)
+    course = course_of(maps.curve, mode.damping, mode.stiffness)
     user = _resolve_user(config, mode, maps)
     until = edited_until(user.grabs)
     carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)
