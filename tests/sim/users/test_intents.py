@@ -7,32 +7,10 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push
-from sim.users.intents import (
-    Bend,
-    ChangeOver,
-    CutCorner,
-    Exaggerate,
-    GetLost,
-    Lead,
-    Own,
-    Press,
-    Relax,
-    Resist,
-    Trace,
-)
+from sim.users.intents import Bend, ChangeOver, CutCorner, Exaggerate, GetLost, Lead, Own, Press, Relax, Resist, Trace
 from sim.users.participant import Participant
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
-from sim.users.person.wishes import (
-    ENGAGED,
-    FORCE,
-    GRIP,
-    PLACE,
-    SWITCH,
-    Wishes,
-    following,
-    targets,
-    wanted_motion,
-)
+from sim.users.person.wishes import ENGAGED, FORCE, GRIP, PLACE, SWITCH, Wishes, following, targets, wanted_motion
 
 CIRCLE = Trajectory.circle(0.04, 4.0)
 INTENTS = [
