@@ -57,7 +57,10 @@ def _flight_rotations(dynamics: Momentum, start: int, end: int, step: float) -> 
             R.append(R[-1] * Rotation.from_rotvec(np.linalg.solve(frame_inertia, missing) * step))
         return R
 
-    found = root(lambda mean: rotations_for(mean)[-1].as_rotvec(), angular.mean(axis=0), tol=1e-10)
+    def landing_rotation(mean: Array) -> Array:
+        return rotations_for(mean)[-1].as_rotvec()
+
+    found = root(landing_rotation, angular.mean(axis=0), tol=1e-10)
     return Rotation.concatenate(rotations_for(np.asarray(found.x))) if found.success else None
 
 

@@ -7,7 +7,6 @@ the number of a tick always gives its time, and no burst of ticks follows a stal
 import contextlib
 import os
 import signal
-import sys
 import time
 import traceback
 from collections.abc import Callable
@@ -138,7 +137,7 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
         Timing limits.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the controls
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    signal.signal(signal.SIGTERM, _exit_on_signal)
     try:
         parts = make()
     except (HvfError, OSError) as error:
@@ -157,6 +156,10 @@ def serve(make: Callable[[], GatedServo], channels: Channels, clock: ServoClock)
             channels.reports.send(process.ended(broken))
         process.close()
         parts.driver.close()
+
+
+def _exit_on_signal(number: int, frame: object) -> None:
+    raise SystemExit(0)
 
 
 @entry_point

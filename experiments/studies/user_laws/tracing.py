@@ -163,5 +163,9 @@ def natural_times(points: Array, seconds: float) -> Array:
         return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
 
     initial_jerk = jerk(np.zeros(2 * _N_HARMONICS))
-    solution = minimize(lambda c: jerk(c) / initial_jerk, np.zeros(2 * _N_HARMONICS), method="L-BFGS-B")
+
+    def relative_jerk(c: Array) -> float:
+        return jerk(c) / initial_jerk
+
+    solution = minimize(relative_jerk, np.zeros(2 * _N_HARMONICS), method="L-BFGS-B")
     return seconds * times(solution.x)
