@@ -23,8 +23,13 @@ from controllers.haptic_map.base import HapticMap
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HandState, stylus_path
-from experiments.bench.part_costs import heaviest_field, picture_microseconds, recorder_cost, tick_microseconds
-from experiments.bench.prepare_cost import prepare_cost
+from experiments.bench.part_costs import (
+    heaviest_field,
+    picture_microseconds,
+    prepare_cost,
+    recorder_cost,
+    tick_microseconds,
+)
 from experiments.bench.results import BenchmarkResult
 from experiments.bench.tick_cost import MODES, PHYSICS_STEP, figure_cost, prepared, tick_cost
 from experiments.bench.trial_cost import trial_cost

@@ -1,4 +1,4 @@
-"""Costs of parts of a run: a tick of the heaviest field, the recorder, and an image of the live page."""
+"""Costs of parts: a tick of the heaviest field, the recorder, an image of the live page, preparing captures."""
 
 import contextlib
 import io
@@ -11,6 +11,7 @@ import numpy as np
 import psutil
 import viser
 from numba import njit
+from scipy.ndimage import gaussian_filter1d
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Program
@@ -22,14 +23,27 @@ from controllers.safety.limiter import ForceLimiter, limit_force
 from controllers.state import HandState
 from experiments.config.options import run_config
 from experiments.live.session.messages import SLICE_SIDE
+from experiments.preparation.tracking_trial import followed
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from geometry.arrays import Array
+from models.humanoid.skeleton import N_TANGENT
+from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation.poses import add_tangents
+from models.mocap.preparation.prepare import prepared
+from models.mocap.readers.own_bvh import write_bvh
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Moment, courses
+
+_CLIPS = ("walk", "run", "jump", "squat_dance")  # gaits, a flight, and a dance in place
+# RMS error of joints [rad] and of the root [m], and its correlation time [s]: the soles then slide and hover by
+# centimetres, as in captures.
+_JOINT_ERROR, _ROOT_ERROR, _CORRELATION_TIME = np.deg2rad(2.0), 0.01, 0.1
+_FOLLOWING_TIME = 5.0  # [s] for which the physical figure follows each clip
 
 
 @njit
@@ -130,3 +144,30 @@ def picture_microseconds(session: Session) -> float:
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()
+
+
+def prepare_cost() -> tuple[float, float]:
+    """Prepare clips with errors like those of captures, and let the physical figure follow them for as long.
+
+    Returns the processor time of preparing, over the clips' duration and over the processor time of following.
+    """
+    rng = np.random.default_rng(0)
+    preparing_time = clip_time = simulating_time = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "capture.bvh"
+        for number, name in enumerate((_CLIPS[0], *_CLIPS)):
+            write_bvh(_add_capture_errors(embedded(name), rng), path)
+            result = prepared(path)
+            cost = followed(result.clip, _FOLLOWING_TIME).cost
+            if number == 0:
+                continue  # warm-up: compiles
+            preparing_time, clip_time = preparing_time + result.seconds, clip_time + result.clip.duration
+            simulating_time += result.clip.duration * cost
+    return preparing_time / clip_time, preparing_time / simulating_time
+
+
+def _add_capture_errors(clip: Clip, rng: np.random.Generator) -> Clip:
+    """The clip with smooth random errors of the root and of all joints, so that its ends do not match."""
+    scale = np.where(np.arange(N_TANGENT) < 3, _ROOT_ERROR, _JOINT_ERROR)
+    errors = gaussian_filter1d(rng.normal(size=(clip.n_frames, N_TANGENT)), _CORRELATION_TIME * clip.fps, axis=0)
+    return Clip(add_tangents(clip.poses, scale * errors / errors.std(axis=0)), clip.fps, clip.name)

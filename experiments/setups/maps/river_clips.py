@@ -13,9 +13,9 @@ from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.fitting.blendable import closed_loops, keep_own_pace, same
 from experiments.fitting.figure_legs import figure_legs
+from experiments.fitting.hand_tours import tour_remarks
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
-from experiments.fitting.river_tour import tour_remarks
 from experiments.setups.maps.about_circle import about_circle, motions_of, place_of
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts

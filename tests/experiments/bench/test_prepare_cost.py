@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.bench.prepare_cost import _CLIPS, _add_capture_errors
+from experiments.bench.part_costs import _CLIPS, _add_capture_errors
 from experiments.flights.ballistics import clip_flights
 from models.mocap.library import embedded
 from models.mocap.preparation.prepare import prepared

@@ -14,7 +14,7 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER, TRANSITION
 from controllers.state import stylus_path
 from experiments.config.options import run_config
-from experiments.fitting import river_changes, river_tour
+from experiments.fitting import hand_tours, river_changes
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.verdict import Trial, Verdict
@@ -169,7 +169,7 @@ def test_remark_names_the_change_before_a_fall_or_the_missing_support(
     from experiments.config.run_config import Figure
 
     monkeypatch.setattr(Trial, "verdict", lambda _: verdict)
-    assert river_tour.tour_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
+    assert hand_tours.tour_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
 
 
 @pytest.fixture(scope="module")
@@ -230,11 +230,11 @@ def test_figure_follows_all_changes_between_three_clips_better_than_offsets() ->
     assert {(change.first, change.second) for change in found.changes} == {
         (a, b) for a in range(3) for b in range(3) if a != b
     }
-    seconds = river_tour._DURATION
+    seconds = hand_tours._RIVERS_DURATION
     by_offsets, by_changes = (
-        followed(river_tour.tour_clip(made, Figure(), FIGURE), seconds) for made in (map_with_offsets, found)
+        followed(hand_tours.tour_of_rivers(made, Figure(), FIGURE), seconds) for made in (map_with_offsets, found)
     )
     # Measured: 4 and 16 %.
     assert by_changes.fell is None
     assert by_changes.residual < min(0.08, 0.5 * by_offsets.residual)
-    assert isinstance(river_tour.tour_clip(found, Figure(), FIGURE), Clip)
+    assert isinstance(hand_tours.tour_of_rivers(found, Figure(), FIGURE), Clip)
