@@ -14,7 +14,7 @@ from controllers.checks import check_field_types, checked
 from controllers.curves.trajectory import END, START, Trajectory, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
 from controllers.fields.river import River, river_flow

@@ -11,7 +11,7 @@ from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY
 from geometry.arrays import Array
 

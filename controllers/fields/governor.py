@@ -13,7 +13,7 @@ from controllers.curves.trajectory import END, START, Trajectory, curve_velocity
 from controllers.fields.admissible import admissible_speeds, checked_speeds
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.state import HAND_POSITION, HAND_VELOCITY
 from geometry.arrays import Array
 

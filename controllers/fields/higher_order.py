@@ -14,7 +14,7 @@ from controllers.curves.trajectory import END, PERIODIC, START, Trajectory, curv
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.algebra.instructions import TRACE_RIVER, write_trace
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import follow_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY

@@ -11,7 +11,7 @@ from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import BREAKS, COEFFICIENTS, PIECE, Trajectory, find_piece, wrap_phase
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_POSITION, HAND_QUATERNION
 from controllers.work_array import work_array
 from geometry.arrays import Array

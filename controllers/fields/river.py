@@ -15,7 +15,7 @@ from controllers.curves.trajectory import Trajectory, curve_point, curve_velocit
 from controllers.errors import ControllerError
 from controllers.fields.admissible import checked_speeds
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from controllers.fields.follow import Follow
 from geometry.arrays import Array
 

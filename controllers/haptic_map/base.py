@@ -180,3 +180,32 @@ class KernelMap(HapticMap):
         pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
         self.map_kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
         return pose, jacobian
+
+
+class Wrapped(HapticMap):
+    """A map whose kernel, called after those of another map, changes its pose, with the same numbers and memory.
+
+    Parameters
+    ----------
+    base : HapticMap
+        The other map.
+    params : Array
+        Parameters of the kernel.
+    """
+
+    def __init__(self, base: HapticMap, params: Array) -> None:
+        self.base, self._params = base, params
+
+    @property
+    def nq(self) -> int:
+        """Numbers of a configuration."""
+        return self.base.nq
+
+    @property
+    def nv(self) -> int:
+        """Numbers of a tangent."""
+        return self.base.nv
+
+    def compiled(self) -> CompiledMap:
+        """The other map with one more stage, and the memory of a new run."""
+        return self.base.compiled().followed_by(self.map_kernel, self._params)

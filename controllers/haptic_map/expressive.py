@@ -8,9 +8,8 @@ from numba import njit
 
 from controllers.curves.cylinder import blend_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap, Wrapped
 from controllers.haptic_map.map_stages import kernels_of
-from controllers.haptic_map.wrapped import Wrapped
 from controllers.state import Pose
 from controllers.work_array import work_array
 from geometry.arrays import Array

@@ -5,9 +5,8 @@ from numba import njit
 
 from controllers.checks import check_kind
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import HapticMap
+from controllers.haptic_map.base import HapticMap, Wrapped
 from controllers.haptic_map.map_stages import CompiledMap
-from controllers.haptic_map.wrapped import Wrapped
 from controllers.state import Pose
 from geometry.arrays import Array
 

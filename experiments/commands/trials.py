@@ -7,7 +7,7 @@ import tyro
 
 from experiments.config.part import part, whole_number
 from experiments.console.output import Json
-from experiments.trials.execution.where import Where
+from experiments.trials.design.study_config import Where
 
 
 @part

@@ -18,11 +18,10 @@ from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
 from experiments.trials.analysis.trial_table import TABLE_CSV, TABLE_PARQUET, trial_table, write_table
 from experiments.trials.design.plan import Trial, code_hash, plan_trials
-from experiments.trials.design.study_config import StudyConfig, StudyError, parse_study, read_toml
+from experiments.trials.design.study_config import StudyConfig, StudyError, Where, parse_study, read_toml
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import check_writable, compile_and_make_maps, run_missing
 from experiments.trials.execution.executors import executor
-from experiments.trials.execution.where import Where
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from experiments.trials.trial.run_trial import Row
 from sim.compilation.whole_files import write_text

@@ -15,11 +15,10 @@ from experiments.certify.certify import certify_into
 from experiments.config.part import to_json
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import bootstrap_interval
-from experiments.trials.design.study_config import StudyError
+from experiments.trials.design.study_config import StudyError, Where
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.drive import compile_and_make_maps
 from experiments.trials.execution.executors import executor
-from experiments.trials.execution.where import Where
 from experiments.tuning.contenders import Contender, contenders
 from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs

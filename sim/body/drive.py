@@ -4,7 +4,7 @@ The body's type selects the compilation unit that sets the torques, and whether 
 """
 
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numba import typeof
@@ -14,14 +14,44 @@ from controllers.fields.algebra.instructions import VECTOR
 from controllers.kernel_call import call_as_given
 from controllers.lent import Lent, by_pointer
 from geometry.arrays import Array, IntArray
-from sim.body.figure_state import FigureState
+from sim.body.figure_state import REPORT_SIZE, FigureState
 from sim.body.robot import RobotState, robot_torque
-from sim.body.unsimulated import KinematicFigure, NoFigure
 from sim.body.whole_body import figure_torque
 from sim.compilation.units import Unit
 from sim.errors import SimError
 from sim.reference.reference import update_unit
 from sim.reference.reference_state import CompiledReference
+
+
+class KinematicFigure(NamedTuple):
+    """A figure shown in the reference pose: the haptic map is evaluated and recorded, and no body tracks it.
+
+    Attributes
+    ----------
+    applied, report : Array
+        Residual wrench (6,) and report (10,) as of the physical figure, always zero.
+    """
+
+    applied: Array
+    report: Array
+
+
+class NoFigure(NamedTuple):
+    """The device alone: the map is not evaluated. The attributes are those of `KinematicFigure`."""
+
+    applied: Array
+    report: Array
+
+
+def kinematic_figure() -> KinematicFigure:
+    """A servo's body for a figure that is only shown."""
+    return KinematicFigure(np.zeros(6), np.zeros(REPORT_SIZE))
+
+
+def no_figure() -> NoFigure:
+    """A servo's body where there is no figure."""
+    return NoFigure(np.zeros(6), np.zeros(REPORT_SIZE))
+
 
 BodyState: TypeAlias = FigureState | RobotState | KinematicFigure | NoFigure
 

@@ -18,9 +18,9 @@ from controllers.state import (
 from geometry.arrays import Array
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import pose_errors
+from sim.body.drive import KinematicFigure, NoFigure
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
 from sim.body.robot import RobotState, tool_positions
-from sim.body.unsimulated import KinematicFigure, NoFigure
 from sim.loop.servo import FrameLog, Servo, TickLog
 from sim.recording.recorder import Group, Recorder
 from sim.world.world import World

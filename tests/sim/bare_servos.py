@@ -11,7 +11,7 @@ from controllers.state import HandState
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import encoder_reading, gimbal_reading
 from models.world.scene import SceneConfig
-from sim.body.unsimulated import no_figure
+from sim.body.drive import no_figure
 from sim.compilation.compiled import entry_point
 from sim.devices.device import DeviceState, actuate, read_device
 from sim.devices.device import advance as advance_device

@@ -23,7 +23,7 @@ from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, f
 from controllers.certificates.region.remainder import Course, Remainder, remainder
 from controllers.certificates.region.tube_bounds import TubeBounds, tube_bounds
 from controllers.certificates.report import CertificateError, Verdict
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from geometry.arrays import Array
 
 # [m], [m/s] limits of a region, beyond which the bounds on the remainder grow too fast. The demo's region reaches

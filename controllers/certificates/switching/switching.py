@@ -37,7 +37,7 @@ from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common
 from controllers.curves.closest_point import closest_phases
-from controllers.fields.algebra.window import window
+from controllers.fields.algebra.weights import window
 from geometry.arrays import Array
 
 CORE_FRACTION = 0.1  # fraction of a tube's radius within which the hysteresis bounds the dwell time

@@ -9,7 +9,6 @@ from numba import njit
 
 from controllers.checks import check_kind, checked, numbers_of
 from controllers.errors import ParameterError
-from controllers.fields.algebra.window import window
 from controllers.safety.limiter import magnitude
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY
 from geometry.arrays import Array
@@ -18,6 +17,18 @@ from geometry.easing import smooth_step
 _MIN_RADIUS = 1e-9  # [m] smallest radius of a ball; a smaller one would never contain a hand
 _CONSTANT, _BALL, _SPEED, _SWITCH = range(4)
 _KIND, _COMPLEMENT, _NUMBERS, WEIGHT_SIZE = 0, 1, 2, 6  # layout of a weight's row: kind, flag for 1 − s, four numbers
+
+
+@njit
+def window(s2: float) -> float:
+    r"""Window w = (1 − s²)³ inside the tube and 0 outside, as a function of s² = (d/ε)².
+
+    It fades a river out at its tube's edge (Donald & Henle 2000, section 2.3), C² everywhere: zero slope at the centre;
+    value, slope and curvature vanish at the edge. The argument s² avoids the square root, so w is smooth at d = 0 too;
+    ε = ∞ gives s² = 0, a river that fills the space.
+    """
+    inside = np.maximum(0.0, 1.0 - s2)
+    return inside * inside * inside
 
 
 @njit

@@ -4,10 +4,9 @@ from controllers.haptic_map.map_stages import CompiledMap
 from experiments.fitting.figure_legs import packed_legs
 from experiments.setups.parts.part_types import Parts, Settings
 from models.world.scene import FIGURE
-from sim.body.drive import BodyState
+from sim.body.drive import BodyState, kinematic_figure, no_figure
 from sim.body.figure import Figure
 from sim.body.robot import robot_state
-from sim.body.unsimulated import kinematic_figure, no_figure
 from sim.reference.reference import make_reference, no_reference
 from sim.reference.reference_state import CompiledReference
 from sim.world.world import World

@@ -4,10 +4,11 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
 
+from controllers.errors import ParameterError
 from experiments.config.part import above, from_dict, part, whole_number
 from sim.errors import SimError
 
@@ -155,3 +156,21 @@ def read_toml(path: Path, what: str) -> dict[str, object]:
         raise StudyError(f"{path}: cannot be read ({error.strerror}); expected the TOML file of {what}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise StudyError(f"{path}: {error}; expected the TOML file of {what}") from None
+
+
+@part
+class Where:
+    """Where trials run: one of three."""
+
+    threads: Annotated[int | None, whole_number(1)] = None
+    """Trials at a time in this process; by default as many as there are processors."""
+    workers: Annotated[int | None, whole_number(1)] = None
+    """Run them in so many processes of a local Dask cluster instead."""
+    cluster: str | None = None
+    """Run them on the workers of this Dask scheduler instead, such as tcp://host:8786."""
+
+    def __post_init__(self) -> None:
+        given = {"--threads": self.threads, "--workers": self.workers, "--cluster": self.cluster}
+        chosen = [name for name, value in given.items() if value is not None]
+        if len(chosen) > 1:
+            raise ParameterError(f"{' and '.join(chosen)} contradict each other; expected one of them")

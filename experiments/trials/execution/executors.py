@@ -5,8 +5,8 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 
+from experiments.trials.design.study_config import Where
 from experiments.trials.execution.drive import Executor
-from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import Row, Task, perform_trial
 
 TASKS_PER_THREAD = 2  # tasks queued for each thread, so that none is idle; more would only take memory

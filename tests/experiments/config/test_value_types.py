@@ -12,8 +12,7 @@ from experiments.config.maps import Cylindrical
 from experiments.config.options import run_config
 from experiments.config.part import from_dict, from_json
 from experiments.config.run_config import Figure, RunConfig
-from experiments.trials.design.study_config import Users, parse_study
-from experiments.trials.execution.where import Where
+from experiments.trials.design.study_config import Users, Where, parse_study
 from experiments.tuning.tune_config import Range, TuneConfig
 from tests.experiments.config.test_options import NEEDED, PARTS
 

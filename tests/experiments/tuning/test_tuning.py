@@ -15,10 +15,9 @@ from controllers.errors import ParameterError
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.config.options import run_config
 from experiments.config.run_config import load_config
-from experiments.trials.design.study_config import StudyError
+from experiments.trials.design.study_config import StudyError, Where
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.executors import Threads
-from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
 from experiments.tuning import tune as tuning_from_python
