@@ -5,7 +5,7 @@ import fcntl
 import os
 import shutil
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
 
@@ -27,11 +27,15 @@ _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, D
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
-    """Refuse a folder that cannot be written, is in use, or holds a run that may not be replaced."""
-    if out.exists():
+    """Refuse a folder that cannot be written or created, is in use, or holds a run that may not be replaced."""
+    missing = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
         with locked_folder(out):
-            pass
-    check_holds(out, overwrite)
+            check_holds(out, overwrite)
+    finally:
+        with suppress(OSError):  # raised where it was not created, or another process has written into it
+            for folder in missing:
+                folder.rmdir()
 
 
 def check_holds(out: Path, overwrite: bool) -> None:

@@ -83,9 +83,18 @@ def test_unwritable_output_path_is_named(tmp_path: Path, capsys: pytest.CaptureF
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
 def test_output_on_a_file_system_without_size_is_not_reported_as_full(capsys: pytest.CaptureFixture[str]) -> None:
+    """It is refused before anything is compiled, about which the error output would say a line."""
     stderr = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
     assert stderr.startswith("hvf: /proc/nowhere: ")
     assert "free" not in stderr
+
+
+def test_folder_made_in_order_to_see_whether_it_can_be_written_does_not_remain(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "run"
+    refused(["run", "--figure", "none", "--map", "missing.npz", "--out", str(out)], capsys)
+    assert not (tmp_path / "new").exists()
 
 
 def test_folder_with_a_run_is_kept_unchanged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
