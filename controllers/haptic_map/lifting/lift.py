@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.lifting.arrangement import N_ANGLES, Task, arrange, sites_of
+from controllers.haptic_map.lifting.arrangement import arrange
+from controllers.haptic_map.lifting.arrangement_energy import N_ANGLES, Task, sites_of
 from controllers.haptic_map.lifting.common_lap import N_SAMPLES, Phase, common_lap
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure, measure
 from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, closing_gap
