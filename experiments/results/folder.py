@@ -5,7 +5,7 @@ import fcntl
 import os
 import shutil
 from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
@@ -15,6 +15,7 @@ from controllers.errors import ParameterError
 from experiments.config.part import from_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.curve_files import CURVE_FILE
+from experiments.files.made_folder import made_folder
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.errors import SimError
@@ -28,14 +29,8 @@ _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, D
 
 def check_folder(out: Path, overwrite: bool) -> None:
     """Refuse a folder that cannot be written or created, is in use, or holds a run that may not be replaced."""
-    missing = [folder for folder in (out, *out.parents) if not folder.exists()]
-    try:
-        with locked_folder(out):
-            check_holds(out, overwrite)
-    finally:
-        with suppress(OSError):  # raised where it was not created, or another process has written into it
-            for folder in missing:
-                folder.rmdir()
+    with made_folder(out), locked_folder(out):
+        check_holds(out, overwrite)
 
 
 def check_holds(out: Path, overwrite: bool) -> None:

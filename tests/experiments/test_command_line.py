@@ -74,10 +74,16 @@ def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.C
     assert "takes 1 to 4 clips, got 0" in stderr
 
 
-def test_unwritable_output_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("command", [["lift", "walk", "--out"], ["prepare", "missing.bvh"]])
+def test_unwritable_target_is_refused_before_anything_is_computed(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.lifting.lift_report.lift_clips", lambda *_: pytest.fail("clips were lifted"))
     (tmp_path / "file").write_text("no folder")
-    stderr = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
-    assert stderr.startswith(f"hvf: {tmp_path / 'file'}")
+    end = ".npz" if command[0] == "lift" else ".bvh"
+    stderr = refused([*command, str(tmp_path / "file" / f"target{end}")], capsys)
+    assert str(tmp_path / "file") in stderr
+    assert "missing" not in stderr
     assert "Errno" not in stderr
 
 
