@@ -14,21 +14,9 @@ import math
 import numpy as np
 from numba import njit
 
+from controllers.curves import trajectory as packed
 from controllers.curves.bounds import NODE
-from controllers.curves.trajectory import (
-    BREAKS,
-    COEFFICIENTS,
-    LEVELS,
-    PIECE,
-    PIECES,
-    START,
-    TREE,
-    find_piece,
-    piece_acceleration,
-    piece_point,
-    piece_velocity,
-    wrap_phase,
-)
+from controllers.curves.trajectory import find_piece, piece_acceleration, piece_point, piece_velocity, wrap_phase
 from controllers.work_array import work_array, work_integers
 from geometry.arrays import Array
 
@@ -182,13 +170,17 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         t* [s] and |φ(t*) − p| [m], exact to 1e-11 m. NaN distance if p is not finite.
     """
     if not np.isfinite(px + py + pz):
-        return blob[at + START], np.nan
-    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
-    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
+        return blob[at + packed.START], np.nan
+    pieces, first_leaf = int(blob[at + packed.PIECES]), 1 << int(blob[at + packed.LEVELS])
+    breaks, rows, tree = (
+        at + int(blob[at + packed.BREAKS]),
+        at + int(blob[at + packed.COEFFICIENTS]),
+        at + int(blob[at + packed.TREE]),
+    )
     scratch = work_array((48, 8))
     nodes, squares = work_integers(64), work_array(64)
     best: float = math.inf
-    best_t = float(blob[at + START])
+    best_t = float(blob[at + packed.START])
     # From the leaf of the guess upwards, the sibling of each ancestor is searched if it is in reach; without a guess,
     # the search starts at the root.
     below = 1
@@ -196,7 +188,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
         guess = wrap_phase(blob, at, guess)
         # The hand may have moved over some pieces since: a Newton step follows it over them.
         piece = find_piece(blob, at, guess)
-        f, slope = _quintic(blob, rows + piece * PIECE, guess - blob[breaks + piece], px, py, pz)
+        f, slope = _quintic(blob, rows + piece * packed.PIECE, guess - blob[breaks + piece], px, py, pz)
         if slope > 0.0:
             guess = wrap_phase(blob, at, guess - f / slope)
         below = first_leaf + find_piece(blob, at, guess)
@@ -221,7 +213,7 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
                 piece = node - first_leaf
                 start = blob[breaks + piece]
                 h = blob[breaks + piece + 1] - start
-                square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
+                square, u = nearest_on_piece(blob, rows + piece * packed.PIECE, h, px, py, pz, scratch)
                 distance = math.sqrt(square)
                 if distance < best - _TIE_TOLERANCE:
                     best, best_t = distance, start + u

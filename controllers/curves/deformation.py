@@ -15,22 +15,10 @@ the curve before all edits and after the committed ones, and the packed curve it
 import numpy as np
 from numba import njit
 
+from controllers.curves import trajectory as packed
 from controllers.curves.bounds import NODE
 from controllers.curves.closest_point import chord_square
-from controllers.curves.trajectory import (
-    BREAKS,
-    COEFFICIENTS,
-    END,
-    LEVELS,
-    PERIODIC,
-    PIECE,
-    PIECES,
-    START,
-    TREE,
-    curve_point,
-    find_piece,
-    wrap_phase,
-)
+from controllers.curves.trajectory import curve_point, find_piece, wrap_phase
 from geometry.arrays import Array
 
 # The record's header: step of the grid [s]; h/2 [steps]; number of edits in force, and including those undone; capacity
@@ -57,9 +45,9 @@ def work_curve(record: Array, at: int) -> int:
 def _add_bump(record: Array, at: int, edit: int, source: int, target: int) -> tuple[int, int]:
     """Write source + bump to target on the pieces under the edit at ``record[edit:]``; return first piece and count."""
     curve = work_curve(record, at)
-    breaks, n = curve + int(record[curve + BREAKS]), int(record[curve + PIECES])
+    breaks, n = curve + int(record[curve + packed.BREAKS]), int(record[curve + packed.PIECES])
     centre, width = record[edit], record[edit + 1]
-    period = record[curve + END] - record[curve + START] if record[curve + PERIODIC] > 0.0 else 0.0
+    period = record[curve + packed.END] - record[curve + packed.START] if record[curve + packed.PERIODIC] > 0.0 else 0.0
     first = find_piece(record, curve, wrap_phase(record, curve, centre - width + 1e-6 * record[at + STEP]))
     piece, count = first, 0
     while count < n and piece < n:
@@ -80,7 +68,7 @@ def _add_bump(record: Array, at: int, edit: int, source: int, target: int) -> tu
             6.0 * (outside - inner * inside) / width**2,
             -side * 2.0 * (1.0 - inner) / width**3,
         )
-        row = PIECE * piece
+        row = packed.PIECE * piece
         for power in range(4):
             for axis in range(3):
                 i = row + 7 * power + axis
@@ -137,12 +125,12 @@ def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
     The radius of a run's capsule is the distance of the joint of its halves from its chord plus the larger radius of
     the halves: at most a third larger than necessary on a smooth curve, at a cost proportional to the number of pieces.
     """
-    tree, rows = curve + int(record[curve + TREE]), curve + int(record[curve + COEFFICIENTS])
-    breaks, leaf = curve + int(record[curve + BREAKS]), 1 << int(record[curve + LEVELS])
+    tree, rows = curve + int(record[curve + packed.TREE]), curve + int(record[curve + packed.COEFFICIENTS])
+    breaks, leaf = curve + int(record[curve + packed.BREAKS]), 1 << int(record[curve + packed.LEVELS])
     for piece in range(first, first + count):
         h = record[breaks + piece + 1] - record[breaks + piece]
-        _bound_piece(record, tree + NODE * (leaf + piece), rows + PIECE * piece, h)
-    low, high, last = leaf + first, leaf + first + count - 1, leaf + int(record[curve + PIECES]) - 1
+        _bound_piece(record, tree + NODE * (leaf + piece), rows + packed.PIECE * piece, h)
+    low, high, last = leaf + first, leaf + first + count - 1, leaf + int(record[curve + packed.PIECES]) - 1
     while low > 1:
         low, high = low // 2, high // 2
         for number in range(low, high + 1):
@@ -157,7 +145,7 @@ def bound_pieces(record: Array, curve: int, first: int, count: int) -> None:
 @njit
 def _bound_run(record: Array, curve: int, first: int, count: int) -> None:
     """`bound_pieces` for a run that may continue beyond the seam of a periodic curve."""
-    before = min(count, int(record[curve + PIECES]) - first)
+    before = min(count, int(record[curve + packed.PIECES]) - first)
     bound_pieces(record, curve, first, before)
     if count > before:
         bound_pieces(record, curve, 0, count - before)
@@ -165,7 +153,7 @@ def _bound_run(record: Array, curve: int, first: int, count: int) -> None:
 
 @njit
 def _copy_pieces(record: Array, at: int, source: int, target: int) -> None:
-    length = PIECE * int(record[work_curve(record, at) + PIECES])
+    length = packed.PIECE * int(record[work_curve(record, at) + packed.PIECES])
     record[target : target + length] = record[source : source + length]
 
 
@@ -173,9 +161,9 @@ def _copy_pieces(record: Array, at: int, source: int, target: int) -> None:
 def discard_edit(record: Array, at: int) -> None:
     """Discard the pending edit: the curve is restored, bit for bit, to the state after the committed edits."""
     curve = work_curve(record, at)
-    rows = curve + int(record[curve + COEFFICIENTS])
+    rows = curve + int(record[curve + packed.COEFFICIENTS])
     _copy_pieces(record, at, at + int(record[at + COMMITTED]), rows)
-    bound_pieces(record, curve, 0, int(record[curve + PIECES]))
+    bound_pieces(record, curve, 0, int(record[curve + packed.PIECES]))
 
 
 @njit
@@ -186,16 +174,16 @@ def begin_edit(record: Array, at: int, phase: float) -> bool:
     """
     curve, step = work_curve(record, at), record[at + STEP]
     phase = wrap_phase(record, curve, phase)
-    cell = int(np.floor((phase - record[curve + START]) / step + 0.5))
+    cell = int(np.floor((phase - record[curve + packed.START]) / step + 0.5))
     half = int(record[at + HALF])
-    if record[curve + PERIODIC] == 0.0:
-        to_end = int(np.floor((record[curve + END] - record[curve + START]) / step + 0.5)) - cell
+    if record[curve + packed.PERIODIC] == 0.0:
+        to_end = int(np.floor((record[curve + packed.END] - record[curve + packed.START]) / step + 0.5)) - cell
         half = min(half, min(cell, to_end) // 2)
         if 4 * half < record[at + HALF]:
             return False
     record[at + PHASE] = phase
     record[at + ANCHOR], record[at + ANCHOR + 1], record[at + ANCHOR + 2] = curve_point(record, curve, phase)
-    record[at + PENDING] = record[curve + START] + cell * step
+    record[at + PENDING] = record[curve + packed.START] + cell * step
     record[at + PENDING + 1] = 2 * half * step
     for i in range(3):
         record[at + PENDING + 2 + i] = 0.0
@@ -210,7 +198,7 @@ def drag_to(record: Array, at: int, x: float, y: float, z: float) -> None:
     record[edit + 2] = (x - record[at + ANCHOR]) / weight
     record[edit + 3] = (y - record[at + ANCHOR + 1]) / weight
     record[edit + 4] = (z - record[at + ANCHOR + 2]) / weight
-    rows = curve + int(record[curve + COEFFICIENTS])
+    rows = curve + int(record[curve + packed.COEFFICIENTS])
     first, count = _add_bump(record, at, edit, at + int(record[at + COMMITTED]), rows)
     _bound_run(record, curve, first, count)
 

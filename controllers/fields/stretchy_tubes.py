@@ -7,21 +7,9 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import check_field_types, checked
+from controllers.curves import deformation
 from controllers.curves.closest_point import closest_phase
-from controllers.curves.deformation import (
-    ANCHOR,
-    COUNT,
-    EDIT,
-    PHASE,
-    TABLE,
-    begin_edit,
-    commit,
-    discard_edit,
-    drag_to,
-    redo,
-    undo,
-    work_curve,
-)
+from controllers.curves.deformation import begin_edit, commit, discard_edit, drag_to, redo, undo, work_curve
 from controllers.curves.editing import curve_of, record_of
 from controllers.curves.trajectory import Trajectory, curve_point
 from controllers.errors import ParameterError
@@ -104,7 +92,7 @@ def _start_push(radius: float, memory: Array, slot: int, p: Array, distance: flo
     if distance < radius and begin_edit(memory, record, memory[slot + _PHASE]):
         memory[slot + _MODE] = PUSHING
         for i in range(3):
-            memory[slot + _NORMAL + i] = (p[i] - memory[record + ANCHOR + i]) / max(distance, 1e-9)
+            memory[slot + _NORMAL + i] = (p[i] - memory[record + deformation.ANCHOR + i]) / max(distance, 1e-9)
 
 
 @njit
@@ -113,9 +101,9 @@ def _push_curve(radius: float, memory: Array, slot: int, p: Array) -> float:
     record = slot + _RECORD
     depth = radius
     for i in range(3):
-        depth -= (p[i] - memory[record + ANCHOR + i]) * memory[slot + _NORMAL + i]
+        depth -= (p[i] - memory[record + deformation.ANCHOR + i]) * memory[slot + _NORMAL + i]
     if depth > 0.0:
-        a, n = record + ANCHOR, slot + _NORMAL
+        a, n = record + deformation.ANCHOR, slot + _NORMAL
         drag_to(
             memory, record, memory[a] - depth * memory[n], memory[a + 1] - depth * memory[n + 1],
             memory[a + 2] - depth * memory[n + 2],
@@ -178,14 +166,14 @@ def stretchy_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
     if mode == HOLDING:
         drag_to(memory, record, p[0], p[1], p[2])
         stiffness = gains.stretch
-        held = slot + _PRESS_POINT if gains.at_stylus > 0.0 else record + ANCHOR
+        held = slot + _PRESS_POINT if gains.at_stylus > 0.0 else record + deformation.ANCHOR
         target = (memory[held], memory[held + 1], memory[held + 2])
-        phase = memory[record + PHASE]
+        phase = memory[record + deformation.PHASE]
     elif mode == PUSHING:
         depth, n = _push_curve(gains.radius, memory, slot, p), slot + _NORMAL
         stiffness = gains.stretch
         target = (p[0] + depth * memory[n], p[1] + depth * memory[n + 1], p[2] + depth * memory[n + 2])
-        phase = memory[record + PHASE]
+        phase = memory[record + deformation.PHASE]
     elif mode != PROBING:
         stiffness = gains.seek
         target = curve_point(memory, curve, phase)
@@ -310,8 +298,8 @@ class StretchyTubes(Law):
     def edits(self, memory: Array, slot: int = TRACE_SIZE) -> Array:
         """Current edits in the memory of a run, each [t̂ [s], h [s], δ̂ (3) [m]]; shape (n, 5), n up to `depth`."""
         record = memory[slot + _RECORD :]
-        table, count = int(record[TABLE]), int(record[COUNT])
-        return record[table : table + EDIT * count].reshape(count, EDIT).copy()
+        table, count = int(record[deformation.TABLE]), int(record[deformation.COUNT])
+        return record[table : table + deformation.EDIT * count].reshape(count, deformation.EDIT).copy()
 
     def held_off(self, memory: Array) -> float:
         """Largest distance [m] of a held point from the stylus in a run."""

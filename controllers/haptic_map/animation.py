@@ -1,6 +1,8 @@
 """Base classes of the maps that blend clips: clips become loops, and a lap of the hand plays a lap of every clip."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -78,23 +80,26 @@ class AnimationMap(ClipMap):
     ------
     ParameterError
         If the clips' poses differ in size, or lack joints of a limb or of the second group.
+
+    Attributes
+    ----------
+    share : float
+        λ, share of the other clips that is blended into the second group; `share_at` is its place among the numbers.
     """
 
+    share: float = 1.0
+    share_at: ClassVar[int]
+
     def __init__(
-        self,
-        clips: Sequence[tuple[Array, float]],
-        numbers: Sequence[float] | Array,
-        second_group: Sequence[int],
-        limbs: Sequence[Limb],
-        lap: float | None = None,
-        apart: bool = False,
-    ) -> None:
+        self, clips: Sequence[tuple[Array, float]], numbers: Sequence[float] | Array, second_group: Sequence[int],
+        limbs: Sequence[Limb], lap: float | None = None, apart: bool = False,
+    ) -> None:  # fmt: skip
         poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
         loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
         self.loops: list[Loop] = fit_to_lap(loops, lap, apart)
-        self.lap = lap
+        self.lap, self.second_group = lap, tuple(second_group)
         limbs = [limb.with_limits_for(poses) for limb in limbs]
         groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
         for joint in second_group:
@@ -120,6 +125,21 @@ class AnimationMap(ClipMap):
     def lap_seconds(self) -> float:
         """Duration of a lap at which the clips of the legs run on average at their own pace [s]."""
         return float(np.mean(self.lap_durations))
+
+    def with_share(self, share: float) -> Self:
+        """The same map with another share λ of the others' joints: 0 plays the clip of the legs alone.
+
+        Raises
+        ------
+        ParameterError
+            If the share is not from 0 to 1, or all joints are blended.
+        """
+        if not (self.second_group and 0.0 <= share <= 1.0):
+            raise ParameterError(f"a map with legs of one clip takes a share of other joints from 0 to 1, got {share}")
+        other = copy(self)
+        other._params = self._params.copy()
+        other._params[self.share_at] = other.share = share
+        return other
 
     def lap_array(self) -> dict[str, Array]:
         """The lap that the map was made for, as an array by key; empty without one."""

@@ -8,16 +8,8 @@ import numpy.typing as npt
 
 from controllers.checks import numbers_of
 from controllers.errors import ParameterError
+from controllers.haptic_map import own_map
 from controllers.haptic_map.map_stages import CompiledMap, register
-from controllers.haptic_map.own_map import (
-    N_FIGURE_POSE,
-    PythonCallback,
-    check_derivative,
-    checked_jacobian,
-    checked_pose,
-    finite_differences,
-    python_map,
-)
 from controllers.state import Pose, stylus_path
 from geometry.arrays import Array
 
@@ -46,9 +38,9 @@ class HapticMap(ABC):
     derivative is computed by finite differences; a `jacobian` of its own is compared with them before a run.
     """
 
-    map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(python_map)
+    map_kernel: ClassVar["staticmethod[[Array, Array, Array, Array, Array], None]"] = staticmethod(own_map.python_map)
     """The kernel of the class (see `controllers.haptic_map.map_stages`); by default one that calls Python."""
-    _callback: ClassVar[PythonCallback | None] = None
+    _callback: ClassVar[own_map.PythonCallback | None] = None
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -92,11 +84,11 @@ class HapticMap(ABC):
         callback = self._callback
         if callback is None:
             # Looked up by name, so that a method replaced in its class is called.
-            callback = PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
+            callback = own_map.PythonCallback(type(self).__name__, lambda x: self.pose(x), lambda x: self.jacobian(x))
             object.__setattr__(self, "_callback", callback)  # kept alive here, since the tick has only its address
         origin = np.array(_ORIGIN)
         start = self.pose(origin)
-        callback.begin(checked_pose(start, np.size(start), type(self).__name__, origin))
+        callback.begin(own_map.checked_pose(start, np.size(start), type(self).__name__, origin))
         return CompiledMap.of(self.map_kernel, callback.params, np.zeros(1))
 
     def check(self) -> None:
@@ -106,7 +98,7 @@ class HapticMap(ABC):
 
     def jacobian(self, x: Array, memory: Array | None = None) -> Array:
         """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in `pose`."""
-        return finite_differences(self.pose, np.asarray(x, dtype=np.float64))
+        return own_map.finite_differences(self.pose, np.asarray(x, dtype=np.float64))
 
     def check_jacobian(self, points: Array) -> None:
         """Compare a user-defined `jacobian` with finite differences of the pose at points (n, 3) of the upright stylus.
@@ -120,8 +112,10 @@ class HapticMap(ABC):
             return
         nq, nv, name = self.nq, self.nv, type(self).__name__
         for x in stylus_path(np.asarray(points, dtype=np.float64)):
-            given = checked_jacobian(self.jacobian(x), nv, name, x)
-            check_derivative(given, lambda moved: checked_pose(self.pose(moved), nq, name, moved), name, x)
+            given = own_map.checked_jacobian(self.jacobian(x), nv, name, x)
+            own_map.check_derivative(
+                given, lambda moved: own_map.checked_pose(self.pose(moved), nq, name, moved), name, x
+            )
 
     def push_forward(self, x: Array, twist: Array, memory: Array | None = None) -> Array:
         """Push-forward h_* ẋ, shape (nv,), of a stylus velocity at x to rates of the target.
@@ -156,7 +150,7 @@ class KernelMap(HapticMap):
 
     def __init__(self, params: npt.ArrayLike) -> None:
         name = type(self).__name__
-        if self.map_kernel is python_map:  # which would take the first parameter for an address
+        if self.map_kernel is own_map.python_map:  # which would take the first parameter for an address
             raise ParameterError(f"{name} has no kernel; expected map_kernel = staticmethod(...) of an njit function")
         self._params = numbers_of(f"params of {name}", params)
         if self._params.ndim != 1:
@@ -165,7 +159,7 @@ class KernelMap(HapticMap):
     @property
     def nq(self) -> int:
         """Numbers of a configuration: 75, those of the figure."""
-        return N_FIGURE_POSE
+        return own_map.N_FIGURE_POSE
 
     def compiled(self) -> CompiledMap:
         """The map in the form of its kernel; by default it has no memory."""

@@ -1,7 +1,6 @@
 """The red-blue composite map: legs of one clip, arms blended of two others (Donald & Henle 2000, Figs. 5 to 7)."""
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 
 import numpy as np
 from numba import njit
@@ -64,18 +63,13 @@ class Composite(AnimationMap):
     """
 
     map_kernel = staticmethod(composite_map)
+    share_at = _SHARE
 
     def __init__(
-        self,
-        lower: tuple[Array, float],
-        red: tuple[Array, float],
-        blue: tuple[Array, float],
-        upper_joints: Sequence[int],
-        r_range: tuple[float, float],
-        limbs: Sequence[Limb] = (),
-        lap: float | None = None,
+        self, lower: tuple[Array, float], red: tuple[Array, float], blue: tuple[Array, float],
+        upper_joints: Sequence[int], r_range: tuple[float, float], limbs: Sequence[Limb] = (), lap: float | None = None,
         apart: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
@@ -83,7 +77,6 @@ class Composite(AnimationMap):
         numbers = checked_interval("r_range", r_range, AXIS)
         super().__init__((lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
                          apart)  # fmt: skip
-        self.share = 1.0
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -101,21 +94,6 @@ class Composite(AnimationMap):
     def lap_seconds(self) -> float:
         """As in `AnimationMap`."""
         return self.loops[0].duration
-
-    def with_share(self, share: float) -> "Composite":
-        """The same map with another share λ of red and blue: 0 leaves the upper body to the lower clip.
-
-        Raises
-        ------
-        ParameterError
-            If the share is not from 0 to 1.
-        """
-        if not 0.0 <= share <= 1.0:
-            raise ParameterError(f"the share of other clips' joints is from 0 to 1, got {share}")
-        other = copy(self)
-        other._params = self._params.copy()
-        other._params[_SHARE] = other.share = share
-        return other
 
     def arrays(self) -> dict[str, Array]:
         """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
@@ -142,4 +120,4 @@ class Composite(AnimationMap):
         upper, limbs = [int(joint) for joint in joints], stored_limbs(arrays)
         share = float(stored_array(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
         result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, stored_lap(arrays), "apart" in arrays)
-        return result.with_share(share)
+        return result.with_share(share) if upper else result

@@ -140,18 +140,13 @@ class Cylindrical(AnimationMap):
     """
 
     map_kernel = staticmethod(cylindrical_map)
+    share_at = _SHARE
 
     def __init__(
-        self,
-        clips: Sequence[tuple[Array, float]],
-        r_range: tuple[float, float],
-        z_range: tuple[float, float],
-        limbs: Sequence[Limb] = (),
-        corrections: Array | None = None,
-        lap: float | None = None,
-        upper: Sequence[int] = (),
-        legs_of: int = 0,
-    ) -> None:
+        self, clips: Sequence[tuple[Array, float]], r_range: tuple[float, float], z_range: tuple[float, float],
+        limbs: Sequence[Limb] = (), corrections: Array | None = None, lap: float | None = None,
+        upper: Sequence[int] = (), legs_of: int = 0,
+    ) -> None:  # fmt: skip
         if len(clips) != _CLIPS:
             raise ParameterError(
                 f"the cylindrical map blends {_CLIPS} clips, got {len(clips)}; give one more than once"
@@ -160,7 +155,7 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, AXIS), *checked_interval("z_range", z_range, -np.inf))
         if not 0 <= legs_of < _CLIPS:
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
-        self.upper, self.legs_of, self.share = tuple(upper), legs_of, 1.0
+        self.upper, self.legs_of = tuple(upper), legs_of
         legs = 1.0 + legs_of if self.upper else 0.0
         super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
@@ -234,21 +229,6 @@ class Cylindrical(AnimationMap):
         rows = len(values)
         values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
         other._set_corrections(values)
-        return other
-
-    def with_share(self, share: float) -> "Cylindrical":
-        """The same map with another share λ of the other clips' joints: 0 plays the clip of the legs alone.
-
-        Raises
-        ------
-        ParameterError
-            If the share is not from 0 to 1, or all joints are blended.
-        """
-        if not (self.upper and 0.0 <= share <= 1.0):
-            raise ParameterError(f"a map with legs of one clip takes a share of other joints from 0 to 1, got {share}")
-        other = copy(self)
-        other._params = self._params.copy()
-        other._params[_SHARE] = other.share = share
         return other
 
     def arrays(self) -> dict[str, Array]:

@@ -18,20 +18,8 @@ import numpy as np
 from numba import njit
 
 from controllers.errors import ParameterError
-from controllers.safety.arming import (
-    ARM,
-    ARMING,
-    CLEAR,
-    DISARM,
-    DISARMED,
-    FAULTED,
-    QUIET,
-    RAMPED,
-    RAMPING,
-    RELEASED,
-    motors_on,
-    next_state,
-)
+from controllers.safety import arming
+from controllers.safety.arming import motors_on, next_state
 from controllers.safety.faults import FAULT_CODE, FORCE_NOT_FINITE, Fault, latch
 from controllers.safety.limiter import magnitude
 from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
@@ -75,8 +63,8 @@ def pass_gate(
     quiet = held and size <= params[_SMALL_FORCE]
     gate[GATE_QUIET] = gate[GATE_QUIET] + period if quiet else 0.0
 
-    if request == CLEAR and faults[FAULT_CODE] == 0.0:
-        gate[GATE_STATE] = next_state(int(gate[GATE_STATE]), CLEAR)
+    if request == arming.CLEAR and faults[FAULT_CODE] == 0.0:
+        gate[GATE_STATE] = next_state(int(gate[GATE_STATE]), arming.CLEAR)
     state = _apply_requests(params, int(gate[GATE_STATE]), request, held, gate[GATE_QUIET])
     if motors_on(state):
         _check_motion(params, faults, hand)
@@ -89,10 +77,10 @@ def pass_gate(
         shaken[:] = 0.0
         shaken[OSCILLATION_GAIN] = 1.0
     if faults[FAULT_CODE] != 0.0:
-        state = next_state(state, FAULTED)
+        state = next_state(state, arming.FAULTED)
     share = min(1.0, gate[GATE_SHARE] + period / params[_RAMP_TIME]) if motors_on(state) else 0.0
-    if state == RAMPING and share >= 1.0:
-        state = next_state(state, RAMPED)
+    if state == arming.RAMPING and share >= 1.0:
+        state = next_state(state, arming.RAMPED)
     gate[GATE_STATE], gate[GATE_SHARE], gate[GATE_GAIN] = state, share, max(0.0, gain)
     if motors_on(state):
         _limit_slew(
@@ -106,12 +94,12 @@ def pass_gate(
 @njit
 def _apply_requests(params: Array, state: int, request: int, held: bool, quiet: float) -> int:
     """State after the user's request, the dead-man switch, and the time that the force has been small [s]."""
-    if request == DISARM or (request == ARM and params[_PERMITTED] > 0.0):
+    if request == arming.DISARM or (request == arming.ARM and params[_PERMITTED] > 0.0):
         state = next_state(state, request)
     if not held:
-        state = next_state(state, RELEASED)
-    if state == ARMING and quiet >= params[_QUIET_TIME]:
-        state = next_state(state, QUIET)
+        state = next_state(state, arming.RELEASED)
+    if state == arming.ARMING and quiet >= params[_QUIET_TIME]:
+        state = next_state(state, arming.QUIET)
     return state
 
 
@@ -243,5 +231,5 @@ class Gate:
     def fresh_memory(self) -> Array:
         """Memory of a device that is disarmed."""
         memory = np.zeros(GATE_SIZE)
-        memory[GATE_STATE], memory[GATE_GAIN] = DISARMED, 1.0
+        memory[GATE_STATE], memory[GATE_GAIN] = arming.DISARMED, 1.0
         return memory

@@ -5,6 +5,7 @@ from functools import partial
 from itertools import permutations
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from controllers.certificates.loop.device import Device
@@ -16,18 +17,25 @@ from controllers.certificates.loop.stability import River, stability
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common, common_lyapunov
 from controllers.certificates.switching.switching import HandRetention, SelectionRule, competing_river, switching
-from controllers.certificates.switching.switching_search import counterexample
+from controllers.certificates.switching.switching_search import Course, Push, counterexample
 from controllers.curves.trajectory import Trajectory
+from controllers.fields.algebra.instructions import TRACE_RIVER
+from controllers.fields.algebra.program import evaluate
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.safety.limiter import ForceLimiter
+from controllers.state import POSITION
 from experiments.certify.certified_field import given_curves
-from experiments.certify.crossing_simulation import simulated_course
+from experiments.certify.trial_simulation import trial_model
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
 from experiments.setups.modes.lifted_runs import lifted_river, side_by_side
 from experiments.setups.modes.rivers import default_choice, law_of
 from geometry.arrays import Array
+from sim.world.phantom_port import actuate, phantom_port, sense, sensed_before
+from sim.world.world import place_stylus
+
+SUBSTEPS = 8
 
 
 class Meeting(NamedTuple):
@@ -145,3 +153,34 @@ def _summed_verdict(common: Common | None) -> Verdict:
     )
     assumptions = ("a hand in the middle of its range stays where two rivers are nearest", "linear, in that place")
     return Verdict("certified", reason, 1.0 - common.rate, assumptions, {}, {"common_p": common.p})
+
+
+def simulated_course(
+    field: HigherOrder, sampling: Sampling, start: Array, velocity: Array, seconds: float, push: Push | None
+) -> Course:
+    """`switching_search.course` with the full linkage in MuJoCo, including Coulomb friction, weight and encoders.
+
+    Sensing, law and actuation are the servo's kernels, called tick by tick. The push acts through the motors.
+    """
+    model = trial_model(HandImpedance(), sampling.period / SUBSTEPS, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    data = mujoco.MjData(model)
+    port = phantom_port(model, data, sampling.period, sampling.cutoff)
+    place_stylus(model, data, start, v_H=velocity)
+    mujoco.mj_forward(model, data)
+    # The velocity filter starts settled at the initial velocity.
+    sensed_before(port, data.qpos[list(port.arm_q)], data.qvel[list(port.arm_v)])
+    program = field.program()
+    memory, wrench = program.fresh_memory(), np.zeros(6)
+    n = round(seconds / sampling.period)
+    p, river = np.zeros((n, 3)), np.zeros(n)
+    for k in range(n):
+        t = k * sampling.period
+        sense(port, t, 0.0)
+        evaluate(*program.compiled(), memory, port.hand, wrench)
+        p[k], river[k] = port.hand[POSITION], memory[TRACE_RIVER]
+        force = wrench[:3].copy()
+        if push is not None and push.start <= t < push.start + push.duration:
+            force += push.force
+        actuate(port, force)
+        mujoco.mj_step(model, data, SUBSTEPS)
+    return Course(p, river)

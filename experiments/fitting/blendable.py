@@ -93,22 +93,13 @@ def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
     return [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
 
 
-def largest_pace_error(loops: Sequence[Loop], seconds: float) -> float:
-    """Largest |log| of the ratio of the pace at which a round [s] plays a loop to the loop's own pace."""
-    return max(abs(float(np.log(loop.duration / seconds))) for loop in loops)
-
-
-def with_loop_first(first: int, loops: Sequence[Loop]) -> list[Loop]:
-    """The loops with the one of index `first` moved to the front."""
-    return [loops[first], *loops[:first], *loops[first + 1 :]]
-
-
 def best_lap(clips: Sequence[Clip], timing: int, in_rounds: bool) -> float:
     """Duration of a lap [s] in which the clip of index `timing` plays at its own pace, and the others nearly so.
 
     `in_rounds` says whether the clips may be played in rounds of several laps; long laps are then divided.
     """
-    lap = natural_lap(with_loop_first(timing, closed_loops(clips)))
+    loops = closed_loops(clips)
+    lap = natural_lap([loops[timing], *loops[:timing], *loops[timing + 1 :]])
     return round(lap / np.ceil(lap / _MAX_ROUND_LAP) if in_rounds else lap, 6)
 
 

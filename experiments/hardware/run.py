@@ -23,17 +23,7 @@ from experiments.hardware.outcome import Outcome, holds_ticks, outcome_of
 from experiments.hardware.page import page_session, show_status
 from experiments.hardware.parts import MakeEmulated, MakeServo, served, session_of, start_of
 from experiments.hardware.run_options import EMULATED, RunHardware
-from experiments.results.folder import (
-    CONFIG,
-    DEVICE,
-    RECORDING,
-    REPORT,
-    SUMMARY,
-    check_folder,
-    check_holds,
-    clear_folder,
-    locked_folder,
-)
+from experiments.results import folder as results
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
 from models.world.scene import SceneConfig
@@ -49,7 +39,7 @@ from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
 
-_NEW_RECORDING = f"{RECORDING}.new"  # name of the recording until the device is accepted
+_NEW_RECORDING = f"{results.RECORDING}.new"  # name of the recording until the device is accepted
 
 
 def run_hardware(config: RunConfig, options: RunHardware) -> int:
@@ -75,7 +65,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     """
     console = Console(stderr=True)
     check_meaning(options)
-    check_folder(options.out, options.overwrite)
+    results.check_folder(options.out, options.overwrite)
     if not (options.arm or sys.stdin.isatty()):
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     if ignored := ignored_options(config):
@@ -107,16 +97,16 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         warnings = check_device(ready.identity, make.calibration, "inertia" in content)
         begin()
         # Only once the servo ticks, since a program that is killed earlier would leave them behind.
-        write_text(options.out / CONFIG, to_json(config))
+        write_text(options.out / results.CONFIG, to_json(config))
         if content:
-            save_device(content, options.out / DEVICE)
+            save_device(content, options.out / results.DEVICE)
         for line in (*warnings, *ready.said):
             console.print(line, highlight=False)
         if options.view:
             stack.enter_context(_serve_page(config, run))
         last = attend(run, config.seconds, options, console)
         ended = run.stop()
-        outcome = outcome_of(options.out / RECORDING, ready, ended, last)
+        outcome = outcome_of(options.out / results.RECORDING, ready, ended, last)
         summary = _write_results(outcome, session.remarks, options.out, console)
     say(summary, options.json)  # once all is written, for nobody may read it to the end
     return 0 if outcome.sound else 1
@@ -142,20 +132,20 @@ def run_folder(options: RunHardware) -> Generator[Callable[[], None], None, None
 
     def begin() -> None:
         nonlocal begun
-        clear_folder(out)
+        results.clear_folder(out)
         begun = True
         with contextlib.suppress(FileNotFoundError):  # the recorder could not start
-            (out / _NEW_RECORDING).rename(out / RECORDING)
+            (out / _NEW_RECORDING).rename(out / results.RECORDING)
 
-    with locked_folder(out):
-        check_holds(out, options.overwrite)
+    with results.locked_folder(out):
+        results.check_holds(out, options.overwrite)
         (out / _NEW_RECORDING).unlink(missing_ok=True)
         try:
             yield begin
         finally:
             (out / _NEW_RECORDING).unlink(missing_ok=True)
-            if begun and not holds_ticks(out / RECORDING):
-                for name in (CONFIG, DEVICE, RECORDING):
+            if begun and not holds_ticks(out / results.RECORDING):
+                for name in (results.CONFIG, results.DEVICE, results.RECORDING):
                     (out / name).unlink(missing_ok=True)
             with contextlib.suppress(OSError):  # other files are in it
                 if is_new:
@@ -225,17 +215,17 @@ def _serve_page(config: RunConfig, run: HardwareRun) -> Generator[None, None, No
 def _write_results(outcome: Outcome, remarks: tuple[str, ...], out: Path, console: Console) -> dict[str, object]:
     """Write summary and page beside the recording; returns the summary."""
     summary = outcome.to_json() | {"remarks": remarks, "lines": outcome.lines()}
-    if not holds_ticks(out / RECORDING):
+    if not holds_ticks(out / results.RECORDING):
         console.print(f"Nothing was recorded, so nothing is left in {out}.", highlight=False)
         return summary
-    write_text(out / SUMMARY, json_text(summary) + "\n")
-    written = [SUMMARY, RECORDING]
+    write_text(out / results.SUMMARY, json_text(summary) + "\n")
+    written = [results.SUMMARY, results.RECORDING]
     if outcome.recorded:
         # Imported late, as it loads matplotlib.
         from experiments.results.pages.hardware_report import write_hardware_report
 
-        with Recording(out / RECORDING) as recording:
+        with Recording(out / results.RECORDING) as recording:
             write_hardware_report(out, recording, [*remarks, *outcome.lines()])
-        written.insert(0, REPORT)
+        written.insert(0, results.REPORT)
     console.print(f"Written to {out}: {', '.join(written)}.", highlight=False)
     return summary

@@ -250,5 +250,5 @@ def own_parts(haptic_map: HapticMap, curve: Trajectory) -> ClipMapParts:
 
     return ClipMapParts(
         haptic_map=cast(ClipMap, haptic_map), clips=(), curve=check_reach(curve), reach=Circle().radius, rivers=none,
-        river_pushes=none, course=lambda damping, stiffness: curve,
+        river_pushes=none,
     )  # fmt: skip

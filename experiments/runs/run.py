@@ -18,16 +18,7 @@ from experiments.console.estimates import SIMULATING, check_length, cost_estimat
 from experiments.console.progress import simulating, store_duration
 from experiments.files.curve_files import CURVE_FILE, save_curve
 from experiments.files.json_text import json_text
-from experiments.results.folder import (
-    CONFIG,
-    DEFAULT,
-    EDITED,
-    RECORDING,
-    REPORT,
-    SUMMARY,
-    check_folder,
-    claimed_and_cleared,
-)
+from experiments.results import folder as results
 from experiments.results.measures.blocks import BLOCK_FRAMES
 from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.summary import RunSummary
@@ -73,7 +64,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
         If something about the configuration or a file is wrong; the folder is then left unchanged.
     """
     console = Console(stderr=True)
-    check_folder(out, overwrite)
+    results.check_folder(out, overwrite)
     check_length(out, config.seconds, config.clock.servo_period)
     session = wire(config, ready=compiler(console))
     for remark in session.remarks:
@@ -82,22 +73,24 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     cost_message = cost_estimate(out, full_config.seconds, groups(session.servo))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
-    with claimed_and_cleared(out, overwrite):
-        write_text(out / CONFIG, to_json(full_config))
+    with results.claimed_and_cleared(out, overwrite):
+        write_text(out / results.CONFIG, to_json(full_config))
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)
         write_summary(out, summary)
         from experiments.results.pages.report import write_report_of  # matplotlib and viser: after the first tick
 
         write_report_of(out)
-    others = ", ".join(name for name in (EDITED, DEFAULT, SUMMARY, RECORDING) if (out / name).exists())
-    console.print(f"Written to {out}: {REPORT} (open it in a browser), {others}.")
+    others = ", ".join(
+        name for name in (results.EDITED, results.DEFAULT, results.SUMMARY, results.RECORDING) if (out / name).exists()
+    )
+    console.print(f"Written to {out}: {results.REPORT} (open it in a browser), {others}.")
     return summary
 
 
 def write_summary(out: Path, summary: RunSummary) -> None:
     """Write the summary of a run beside its recording."""
-    write_text(out / SUMMARY, json_text(summary) + "\n")
+    write_text(out / results.SUMMARY, json_text(summary) + "\n")
 
 
 def record(
@@ -124,7 +117,7 @@ def record(
         As in `run`.
     """
     servo = session.servo
-    with Recorder(out / RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
+    with Recorder(out / results.RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
         session.haptic_map.check()  # before the measures evaluate it again, outside a tick
@@ -190,7 +183,7 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
     """Summary of a session that has been run, computed from its recording."""
     parts = session.parts
 
-    with Recording(out / RECORDING) as recording:
+    with Recording(out / results.RECORDING) as recording:
         summary = summarise(recording, default_poses(session), speed, session.world.warnings(), parts.handled)
         field = session.servo.field
         of = Measuring(
@@ -202,7 +195,7 @@ def session_summary(out: Path, session: Session, speed: SpeedSummary) -> RunSumm
 
 def write_animations(out: Path, session: Session) -> None:
     """Write two BVH files: the animation as the hand made it, and that of the curve's nearest points at each frame."""
-    with Recording(out / RECORDING) as recording:
+    with Recording(out / results.RECORDING) as recording:
         if not session.world.has_figure:
             return
         reference = recording.channel("frames", "reference")
@@ -215,6 +208,6 @@ def write_animations(out: Path, session: Session) -> None:
         starts, stature = range(0, n, BLOCK_FRAMES), session.world.config.stature
         blocks = [slice(k * per_frame, (k + BLOCK_FRAMES) * per_frame, per_frame) for k in starts]
         edited = (reference[k * stride : (k + BLOCK_FRAMES) * stride : stride] for k in starts)
-        write_bvh_blocks(out / EDITED, n, fps, edited, stature)
+        write_bvh_blocks(out / results.EDITED, n, fps, edited, stature)
         default = (poses_at(*(c[rows] for c in on_curve)) for rows in blocks)
-        write_bvh_blocks(out / DEFAULT, n, fps, default, stature)
+        write_bvh_blocks(out / results.DEFAULT, n, fps, default, stature)

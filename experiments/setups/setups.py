@@ -13,25 +13,22 @@ from experiments.setups.maps.about_circle import place_of
 from experiments.setups.maps.cylindrical import composite_parts, cylindrical_parts
 from experiments.setups.maps.map_file import map_file_setup
 from experiments.setups.maps.river_clips import river_clips_setup
-from experiments.setups.maps.robot_arm import robot_arm_parts
+from experiments.setups.maps.robot_arm import arm_parts, tilted
 from experiments.setups.modes.fixed_curve import bunny_parts, flows_parallel, follow_parts
 from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
 from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.lap import circle_of
 from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import ClipMapParts, MapParts, Parts
 from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
-    "follow": follow_parts,
-    "bunny": bunny_parts,
-    "rivers": rivers_parts,
-    "stretch": stretch_parts,
-    "stretch-then-follow": stretch_then_follow_parts,
-    "lead": lead_parts,
-}
+    "follow": follow_parts, "bunny": bunny_parts, "rivers": rivers_parts, "stretch": stretch_parts,
+    "stretch-then-follow": stretch_then_follow_parts, "lead": lead_parts,
+}  # fmt: skip
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
 
@@ -74,7 +71,7 @@ def map_parts(config: RunConfig, body: MjModel, clips: tuple[Clip, ...] | None =
     """
     played, remarks = clips_for(config.map) if clips is None else (clips, ())
     if isinstance(config.map, RobotArm):
-        return robot_arm_parts(body, config.map)
+        return arm_parts(body, tilted(circle_of(config.map)), config.map.reach, config.map.scale)
     if isinstance(config.map, Led):
         return led_parts(config, played, body).with_remarks(remarks)
     setup = MAP_SETUPS[config.map.kind]

@@ -20,8 +20,7 @@ from controllers.certificates.switching.switching_search import Push, failure
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.certified_rivers import certified_bundle
-from experiments.certify.crossing_simulation import simulated_course
+from experiments.certify.certified_rivers import certified_bundle, simulated_course
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river

@@ -12,6 +12,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from experiments.certify.cached_stability import Stability, cached_stability
+from experiments.trials.design.plan import code_hash
 from experiments.trials.design.study_config import StudyError
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.tune_config import TuneConfig
@@ -112,7 +113,7 @@ def search(
     config: TuneConfig, storage: optuna.storages.BaseStorage, identity: str, panel: Panel, sampler: str,
     progress: Callable[[int], None],
 ) -> list[Candidate]:  # fmt: skip
-    """Search until enough candidates have been simulated, continuing from the candidates in the storage.
+    """Search until enough candidates have been simulated, continuing from those that this code has tried before.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def search(
     storage : optuna.storages.BaseStorage
         Storage of the search; see `storage_of`.
     identity : str
-        Hash of the tuning, its name in the storage.
+        Hash of the tuning, which names it in the storage together with the hash of the code.
     panel : Panel
         Tries the candidates.
     sampler : str
@@ -131,7 +132,8 @@ def search(
     """
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     study = optuna.create_study(
-        storage=storage, study_name=f"{identity}-{sampler}", load_if_exists=True, directions=list(config.directions),
+        storage=storage, study_name=f"{identity}-{code_hash(__name__)}-{sampler}", load_if_exists=True,
+        directions=list(config.directions),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=RANDOM_STARTUP_COUNT, n_warmup_steps=1),
     )  # fmt: skip
     space = distributions_of(config)

@@ -20,6 +20,7 @@ from experiments.files.given_path import given_path
 from experiments.runs.run_result import Run
 from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
+from experiments.trials.design.plan import code_hash
 from experiments.trials.design.study_config import MAX_TRIALS, check_trials
 from geometry.arrays import Array
 
@@ -190,7 +191,7 @@ def _study_name(
     given = sim.haptic_map
     haptic_map = given if is_dataclass(given) and not isinstance(given, HapticMap) else type(given).__name__
     parts = (sim.field, haptic_map, sim.device, sim.figure, sim.clock, sim.seed, sim.tank, tuple(users))
-    settings = (search.sampler, search.seed, search.costs, search.allow_unknown)
+    settings = (search.sampler, search.seed, search.costs, search.allow_unknown, code_hash(__name__))
     return f"hvf.tune {hash_of((described(parts), sorted(space.items()), code_digest(cost), seconds, settings))}"
 
 

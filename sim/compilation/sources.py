@@ -85,7 +85,8 @@ class _CodeHashes:
         entry = self._entries.get(str(path))
         if entry is None or entry[0] != stamp:
             tree = ast.parse(path.read_bytes())
-            entry = stamp, _code_hash(tree), list(_imported_names(tree))
+            code = ast.dump(_DocstringRemover().visit(tree)).encode()
+            entry = stamp, hashlib.sha256(code).hexdigest(), list(_imported_names(tree))
             self._entries[str(path)], self._changed = entry, True
         return entry[1], entry[2]
 
@@ -105,10 +106,6 @@ def _module_file(name: str) -> Path | None:
         return None
     path = _ROOT.joinpath(*name.split("."))
     return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.is_file()), None)
-
-
-def _code_hash(tree: ast.Module) -> str:
-    return hashlib.sha256(ast.dump(_DocstringRemover().visit(tree)).encode()).hexdigest()
 
 
 class _DocstringRemover(ast.NodeTransformer):

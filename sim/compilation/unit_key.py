@@ -219,7 +219,7 @@ def _describe_global(function: Function, chain: tuple[str, ...], callees: _Calle
     return _describe_value(value, name, callees)
 
 
-def _describe_value(value: Any, name: str, callees: _Callees) -> object:  # noqa: C901 - a kind of value a branch
+def _describe_value(value: Any, name: str, callees: _Callees) -> object:
     """Description of a global, closure variable, default or option that differs for different values."""
     if isinstance(value, Dispatcher):
         callees.append((value.py_func, value.targetoptions))
@@ -227,19 +227,6 @@ def _describe_value(value: Any, name: str, callees: _Callees) -> object:  # noqa
     if isinstance(value, _Intrinsic):
         callees.append((value._defn, {}))
         return "intrinsic"
-    if isinstance(value, types.ExternalFunction):
-        return "external", value.symbol, str(value.sig)
-    if isinstance(value, types.Type):
-        return "type", describe_type(value)
-    if isinstance(value, enum.Enum):
-        return "member", type(value).__qualname__, value.name, repr(value.value)
-    if isinstance(value, np.ndarray):
-        if value.dtype.hasobject:
-            raise UnknownIngredient(f"{name} is an array of objects; expected numbers")
-        content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
-        return "array", value.dtype.str, value.shape, value.flags.c_contiguous, content
-    if isinstance(value, np.dtype):
-        return "dtype", repr(value)
     if isinstance(value, dict):
         return "dict", [
             (_describe_value(key, name, callees), _describe_value(item, name, callees)) for key, item in value.items()
@@ -255,7 +242,23 @@ def _describe_value(value: Any, name: str, callees: _Callees) -> object:  # noqa
         callees.append((value, {}))
         callees.extend((template._overload_func, template._jit_options) for template in _overloads(value))
         return "function"
-    return _describe_literal(value, name)
+    return _describe_datum(value, name)
+
+
+def _describe_datum(value: Any, name: str) -> object:
+    """Description of a value that refers to no Python function."""
+    if isinstance(value, types.ExternalFunction):
+        return "external", value.symbol, str(value.sig)
+    if isinstance(value, types.Type):
+        return "type", describe_type(value)
+    if isinstance(value, enum.Enum):
+        return "member", type(value).__qualname__, value.name, repr(value.value)
+    if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            raise UnknownIngredient(f"{name} is an array of objects; expected numbers")
+        content = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+        return "array", value.dtype.str, value.shape, value.flags.c_contiguous, content
+    return ("dtype", repr(value)) if isinstance(value, np.dtype) else _describe_literal(value, name)
 
 
 def _describe_options(options: dict[str, Any]) -> list[object]:

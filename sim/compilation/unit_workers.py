@@ -13,8 +13,12 @@ from sim.compilation.workers import run_in_workers
 
 def missing_units(units: Sequence[Unit]) -> tuple[Unit, ...]:
     """The units that are not in the cache, the largest first."""
+
+    def function_count(unit: Unit) -> int:
+        return len(reached_functions(unit_function(unit.module, unit.name).py_func))
+
     missing = [unit for unit in dict.fromkeys(units) if not unit.is_kept()]
-    return tuple(sorted(missing, key=_function_count, reverse=True))
+    return tuple(sorted(missing, key=function_count, reverse=True))
 
 
 def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda unit: None) -> None:
@@ -30,12 +34,8 @@ def compile_units(units: Sequence[Unit], done: Callable[[Unit], None] = lambda u
     missing = missing_units(units)
     if not missing:
         return
-    calls = [(_load_unit, (unit,)) for unit in missing]
+    calls = [(Unit.load, (unit,)) for unit in missing]
     run_in_workers(calls, lambda number: done(missing[number]), _compile_common_functions if len(missing) > 1 else None)
-
-
-def _function_count(unit: Unit) -> int:
-    return len(reached_functions(unit_function(unit.module, unit.name).py_func))
 
 
 def _compile_common_functions() -> None:
@@ -50,7 +50,3 @@ def _compile_common_functions() -> None:
 
     vector = types.Array(types.float64, 1, "C")
     njit(nogil=True)(assign).compile((vector, vector))
-
-
-def _load_unit(unit: Unit) -> None:
-    unit.load()

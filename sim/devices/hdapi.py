@@ -22,20 +22,9 @@ from sim.compilation.bound_call import BoundCall, keep_arguments
 from sim.compilation.c_function import address_of
 from sim.compilation.memory_access import items
 from sim.compilation.python_clock import clock_for_c
+from sim.devices import hdapi_frame as frame
 from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry
-from sim.devices.hdapi_frame import (
-    FUNCTIONS,
-    IO_CODE,
-    IO_ENABLE,
-    IO_FAULT,
-    IO_NEW,
-    IO_VALUE,
-    N_CLOSING,
-    HdMemory,
-    frame_for_c,
-    send_force,
-    take_sample,
-)
+from sim.devices.hdapi_frame import HdMemory, frame_for_c, send_force, take_sample
 from sim.devices.vendor_library import VendorLibrary
 from sim.devices.virtual_arm import pose_fault
 from sim.errors import SimError
@@ -129,7 +118,7 @@ class HdapiDevice:
             )
         self.telemetry = make_telemetry()
         self.identity = self._read_identity(self._ensure_calibrated())
-        functions = *(getattr(library, name) for name in FUNCTIONS), self._clock
+        functions = *(getattr(library, name) for name in frame.FUNCTIONS), self._clock
         addresses = [address_of(function) for function in functions]
         memory = HdMemory.fresh(addresses, self._device, self._read_nominal_force(), self.telemetry)
         self._memory, self._io, self._zero_torque = memory, items(memory.io), np.zeros(3)
@@ -192,15 +181,15 @@ class HdapiDevice:
         io, take = self._io, self._take_sample
         take()
         deadline = time.monotonic() + timeout
-        while io[IO_NEW] == 0.0 and io[IO_CODE] == 0.0 and time.monotonic() < deadline:
+        while io[frame.IO_NEW] == 0.0 and io[frame.IO_CODE] == 0.0 and time.monotonic() < deadline:
             time.sleep(_POLL_INTERVAL)
             take()
-        if io[IO_CODE] != 0.0:
-            code = int(io[IO_CODE])
-            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), io[IO_VALUE], _symbol(code))
-        if io[IO_FAULT] != 0.0:
-            raise pose_fault(io[IO_FAULT], io[IO_VALUE])
-        if io[IO_NEW] == 0.0:
+        if io[frame.IO_CODE] != 0.0:
+            code = int(io[frame.IO_CODE])
+            raise DriverFault(_FAULTS.get(code, Fault.DEVICE_REPORTED), io[frame.IO_VALUE], _symbol(code))
+        if io[frame.IO_FAULT] != 0.0:
+            raise pose_fault(io[frame.IO_FAULT], io[frame.IO_VALUE])
+        if io[frame.IO_NEW] == 0.0:
             return False
         np.copyto(reading, self._memory.reading)
         return True
@@ -215,21 +204,21 @@ class HdapiDevice:
         """
         io = self._io
         np.copyto(self._memory.torque, torque)
-        io[IO_ENABLE] = enable
+        io[frame.IO_ENABLE] = enable
         self._send_force()
-        if io[IO_FAULT] != 0.0:
-            raise DriverFault(Fault.FORCE_NOT_FINITE, io[IO_VALUE])
+        if io[frame.IO_FAULT] != 0.0:
+            raise DriverFault(Fault.FORCE_NOT_FINITE, io[frame.IO_VALUE])
 
     def let_go(self) -> None:
         """Switch the motors off with the next callback; never raises."""
         np.copyto(self._memory.torque, self._zero_torque)
-        self._io[IO_ENABLE] = 0.0
+        self._io[frame.IO_ENABLE] = 0.0
         self._send_force()
 
     def close(self) -> None:
         """Switch the motors off, stop the scheduler and close the device."""
         self.let_go()
-        self._memory.numbers[N_CLOSING] = 1
+        self._memory.numbers[frame.N_CLOSING] = 1
         self._hd.hdDisable(_FORCE_OUTPUT)
         self._hd.hdStopScheduler()
         self._hd.hdUnschedule(self._task)

@@ -20,25 +20,10 @@ from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.memory_access import items
 from sim.devices import hid_protocol as protocol
+from sim.devices import hid_reports as reports
 from sim.devices.driver import DeviceIdentity, DriverFault, make_telemetry
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_THETA
-from sim.devices.hid_reports import (
-    IO_ENABLE,
-    IO_FAULT,
-    IO_NEW,
-    IO_NOW,
-    IO_READING_TIME,
-    IO_SIZE,
-    IO_VALUE,
-    N_BOOT,
-    N_ENABLED,
-    N_LAST,
-    N_WATCHDOG,
-    WATCHDOG_TIME,
-    HidMemory,
-    judge_report,
-    make_command,
-)
+from sim.devices.hid_reports import HidMemory, judge_report, make_command
 from sim.devices.hidapi_node import Bytes, HidapiNode
 from sim.errors import SimError
 
@@ -106,8 +91,8 @@ class HidPhantom:
         if int(identity["major"]) != protocol.VERSION[0]:
             raise DriverFault(Fault.VERSION_WRONG, int(identity["major"]))
         self._identity_report, numbers = identity, self._hid.numbers
-        numbers[N_BOOT] = int(identity["boot"])
-        numbers[N_WATCHDOG] = min(round(WATCHDOG_TIME * 1e6), int(identity["watchdog_max_us"]))
+        numbers[reports.N_BOOT] = int(identity["boot"])
+        numbers[reports.N_WATCHDOG] = min(round(reports.WATCHDOG_TIME * 1e6), int(identity["watchdog_max_us"]))
         self._hid.peak[:] = identity["peak_torque"] * protocol.PEAK_UNIT
         self._capabilities = int(identity["capabilities"])
 
@@ -125,8 +110,8 @@ class HidPhantom:
         self.identity = DeviceIdentity(
             identity["name"].decode(errors="replace"), self._transport, identity["serial"].decode(errors="replace"),
             identity["firmware"].decode(errors="replace"), motors and bool(np.all(self._hid.peak > 0.0)),
-            watchdog and int(self._hid.numbers[N_WATCHDOG]) > 0, bool(found["flags"] & protocol.CALIBRATED),
-            int(self._hid.numbers[N_BOOT]),
+            watchdog and int(self._hid.numbers[reports.N_WATCHDOG]) > 0, bool(found["flags"] & protocol.CALIBRATED),
+            int(self._hid.numbers[reports.N_BOOT]),
         )  # fmt: skip
 
     def calibrate(self, theta: Array, gimbal: Array) -> None:
@@ -166,24 +151,24 @@ class HidPhantom:
         try:
             size = self._receive(math.ceil(timeout * 1e3))
             while size > 0:
-                io[IO_SIZE], io[IO_NOW] = size, self._clock()
+                io[reports.IO_SIZE], io[reports.IO_NOW] = size, self._clock()
                 self._judge()
-                if io[IO_FAULT] != 0.0:
+                if io[reports.IO_FAULT] != 0.0:
                     self._raise_report_fault()
-                has_new, report_count = io[IO_NEW] > 0.0 or has_new, report_count + 1
+                has_new, report_count = io[reports.IO_NEW] > 0.0 or has_new, report_count + 1
                 size = self._receive(0) if report_count < _MAX_REPORTS_PER_READ else 0
         except OSError:
             raise DriverFault(Fault.UNPLUGGED) from None
         if has_new:
             np.copyto(reading, self._hid.reading)
-            io[IO_READING_TIME] = self._reading[READING_CLOCK]
+            io[reports.IO_READING_TIME] = self._reading[READING_CLOCK]
         return has_new
 
     def _raise_report_fault(self) -> None:
         """Raise the fault of a report; after a reset of the device, its identity is read again first."""
-        if self._io[IO_FAULT] == _DEVICE_RESET:
+        if self._io[reports.IO_FAULT] == _DEVICE_RESET:
             self._reread_after_reset()
-        raise DriverFault(Fault(int(self._io[IO_FAULT])), self._io[IO_VALUE])
+        raise DriverFault(Fault(int(self._io[reports.IO_FAULT])), self._io[reports.IO_VALUE])
 
     def _reread_after_reset(self) -> None:
         """Read identity and calibration again after a reset of the device, in which it may have lost its zero.
@@ -192,8 +177,8 @@ class HidPhantom:
         that the fault recurs until the device is closed.
         """
         numbers = self._hid.numbers
-        old_boot = int(numbers[N_BOOT])
-        numbers[[N_LAST, N_ENABLED]] = -1
+        old_boot = int(numbers[reports.N_BOOT])
+        numbers[[reports.N_LAST, reports.N_ENABLED]] = -1
         self._hid.clocks[0] = math.nan  # the device's clock has restarted
         try:
             self._read_identity()
@@ -201,9 +186,9 @@ class HidPhantom:
         except DriverFault:
             raise
         except SimError:  # no valid answer
-            numbers[N_BOOT] = old_boot
+            numbers[reports.N_BOOT] = old_boot
         if not self.identity.calibrated:
-            numbers[N_BOOT] = old_boot
+            numbers[reports.N_BOOT] = old_boot
 
     def write(self, torque: Array, enable: bool) -> None:
         """See `sim.devices.driver.Driver.write`; torques are limited to the peak torque that the device reports.
@@ -215,10 +200,10 @@ class HidPhantom:
         """
         io = self._io
         np.copyto(self._hid.torque, torque)
-        io[IO_ENABLE], io[IO_NOW] = enable, self._clock()
+        io[reports.IO_ENABLE], io[reports.IO_NOW] = enable, self._clock()
         self._make_command()
-        if io[IO_FAULT] != 0.0:
-            value = io[IO_VALUE]
+        if io[reports.IO_FAULT] != 0.0:
+            value = io[reports.IO_VALUE]
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, value)
         try:

@@ -17,34 +17,12 @@ from controllers.safety.arming import NO_REQUEST, State
 from controllers.safety.faults import Fault
 from geometry.arrays import Array
 from sim.errors import SimError
+from sim.hardware import recorder_process as recording
+from sim.hardware import servo_process as servo
 from sim.hardware.gated_servo import ROW_SIZE, GatedServo, columns
 from sim.hardware.process_start import start_without_sigint
-from sim.hardware.recorder_process import (
-    RECORDER_APART,
-    RECORDER_DROPPED,
-    RECORDER_ERROR,
-    RECORDER_FORCE,
-    RECORDER_READY,
-    RECORDER_ROWS,
-    RECORDER_SIZE,
-    RING_SECONDS,
-    RecordingJob,
-    record_rows,
-)
-from sim.hardware.servo_process import (
-    DETAIL_SIZE,
-    ORDER_BEAT,
-    ORDER_NUMBER,
-    ORDER_REQUEST,
-    ORDER_SIZE,
-    ORDER_STOP,
-    Channels,
-    Ended,
-    Ready,
-    Refused,
-    ServoClock,
-    serve,
-)
+from sim.hardware.recorder_process import RecordingJob
+from sim.hardware.servo_process import Channels, Ended, Ready, Refused, ServoClock, serve
 from sim.hardware.shared import Ring, SharedNumbers
 
 SERVO_TIMEOUT = 0.2
@@ -142,19 +120,19 @@ class HardwareRun:
         self, make: Callable[[], GatedServo], period: float, clock: ServoClock, job: RecordingJob | None = None
     ):
         context = multiprocessing.get_context("spawn")
-        self._orders, self.status = SharedNumbers(ORDER_SIZE), SharedNumbers(ROW_SIZE)
-        self._rows = Ring(round(RING_SECONDS / period), ROW_SIZE)
-        self._stop_recording, self.recorder_status = SharedNumbers(1), SharedNumbers(RECORDER_SIZE)
+        self._orders, self.status = SharedNumbers(servo.ORDER_SIZE), SharedNumbers(ROW_SIZE)
+        self._rows = Ring(round(recording.RING_SECONDS / period), ROW_SIZE)
+        self._stop_recording, self.recorder_status = SharedNumbers(1), SharedNumbers(recording.RECORDER_SIZE)
         self._reports, report_sender = context.Pipe(duplex=False)
-        self._order, self._row, self._last_tick = np.zeros(ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
+        self._order, self._row, self._last_tick = np.zeros(servo.ORDER_SIZE), np.zeros(ROW_SIZE), (-1.0, 0.0)
         self._timeout = SERVO_TIMEOUT + clock.late
-        self._detail = SharedNumbers(DETAIL_SIZE)
+        self._detail = SharedNumbers(servo.DETAIL_SIZE)
         channels = Channels(self._orders, self.status, self._rows, self._detail, report_sender)
         self.servo: BaseProcess = context.Process(target=serve, args=(make, channels, clock), name="servo", daemon=True)
         self.recorder: BaseProcess | None = None
         if job is not None:
             arguments = job, self._rows, self._stop_recording, self.recorder_status
-            self.recorder = context.Process(target=record_rows, args=arguments, name="recorder", daemon=True)
+            self.recorder = context.Process(target=recording.record_rows, args=arguments, name="recorder", daemon=True)
         self._report_sender: Connection = report_sender
         self._final_report: Ended | None = None
 
@@ -187,8 +165,8 @@ class HardwareRun:
 
     def _wait_for_recorder(self, recorder: BaseProcess) -> None:
         """Wait until the recorder is ready or has ended; `poll` then shows whether it could start."""
-        status, deadline = np.zeros(RECORDER_SIZE), time.monotonic() + _START_TIMEOUT
-        while recorder.is_alive() and status[RECORDER_READY] == 0.0 and time.monotonic() < deadline:
+        status, deadline = np.zeros(recording.RECORDER_SIZE), time.monotonic() + _START_TIMEOUT
+        while recorder.is_alive() and status[recording.RECORDER_READY] == 0.0 and time.monotonic() < deadline:
             time.sleep(0.01)
             self.recorder_status.read(status)
 
@@ -200,13 +178,13 @@ class HardwareRun:
 
     def request(self, event: int) -> None:
         """Send `ARM`, `DISARM` or `CLEAR` (of `controllers.safety.arming`)."""
-        self._order[ORDER_NUMBER] += 1.0
-        self._order[ORDER_REQUEST] = event
+        self._order[servo.ORDER_NUMBER] += 1.0
+        self._order[servo.ORDER_REQUEST] = event
         self._orders.write(self._order)
 
     def poll(self) -> RunStatus:
         """Send a heartbeat to the servo, and return the status of the run."""
-        self._order[ORDER_BEAT] += 1.0
+        self._order[servo.ORDER_BEAT] += 1.0
         self._orders.write(self._order)
         self.status.read(self._row)
         row, now = {name: channel[0] for name, channel in columns(self._row[None].copy()).items()}, time.monotonic()
@@ -215,7 +193,7 @@ class HardwareRun:
             self._last_tick = tick, now
         alive = self.servo.is_alive() and now - self._last_tick[1] < self._timeout
         state, fault = State(int(row["state"])), Fault(int(row["fault"]))
-        codes = np.zeros(DETAIL_SIZE)
+        codes = np.zeros(servo.DETAIL_SIZE)
         self._detail.read(codes)
         detail = "".join(map(chr, codes.astype(int))).rstrip("\0")
         return RunStatus(alive, state, fault, float(row["fault_value"]), row, self._read_recorder_status(), detail)
@@ -223,20 +201,20 @@ class HardwareRun:
     def _read_recorder_status(self) -> RecorderStatus | None:
         if self.recorder is None:
             return None
-        status = np.zeros(RECORDER_SIZE)
+        status = np.zeros(recording.RECORDER_SIZE)
         self.recorder_status.read(status)
-        error = int(status[RECORDER_ERROR])
-        force = status[RECORDER_FORCE : RECORDER_FORCE + 3]
+        error = int(status[recording.RECORDER_ERROR])
+        force = status[recording.RECORDER_FORCE : recording.RECORDER_FORCE + 3]
         alive = self.recorder.is_alive() and error == 0
         return RecorderStatus(
-            alive, int(status[RECORDER_ROWS]), int(status[RECORDER_DROPPED]), error, force,
-            float(status[RECORDER_APART]),
+            alive, int(status[recording.RECORDER_ROWS]), int(status[recording.RECORDER_DROPPED]), error, force,
+            float(status[recording.RECORDER_APART]),
         )  # fmt: skip
 
     def stop(self) -> Ended | None:
         """End the servo, then the recorder once it has written all rows; returns the servo's final report, if any."""
         if self._final_report is None and self.servo.pid is not None:
-            self._order[ORDER_STOP], self._order[ORDER_REQUEST] = 1.0, NO_REQUEST
+            self._order[servo.ORDER_STOP], self._order[servo.ORDER_REQUEST] = 1.0, NO_REQUEST
             self._orders.write(self._order)
             report = self._receive_report(_END_TIMEOUT)
             self._final_report = report if isinstance(report, Ended) else None

@@ -6,6 +6,7 @@ watchdog's time, the device is advanced by that time under the last command; the
 continues to run without commands.
 """
 
+import errno
 import os
 import select
 import signal
@@ -15,16 +16,17 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit, types
 
 from controllers.safety.faults import Fault
+from controllers.work_array import work_integers
 from geometry.arrays import Array
 from sim.compilation.bound_call import BoundCall
 from sim.compilation.compiled import entry_point
-from sim.compilation.memory_access import items
+from sim.compilation.memory_access import int32_at, items
 from sim.devices.driver import LOST, READ, ROUND_TRIP, DriverFault, make_telemetry, note_arrival
 from sim.devices.exchange import READING_SEQUENCE, READING_SIZE
 from sim.hardware.emulated import EmulatedPhantom, emulated_identity
-from sim.hardware.packets import CLOSED, NOTHING, monotonic, receive, transmit, wait_for_packet
 from sim.hardware.process_start import parent_id
 from sim.hardware.realtime import become_realtime
 from sim.hardware.shared import SharedNumbers
@@ -36,6 +38,53 @@ _SENDING_TIME, _PACKET_SIZE = READING_SIZE, READING_SIZE + 1  # in a reading's p
 SHOWN_TORQUE, SHOWN_TRIPS, SHOWN_CLOCK, SHOWN_SIZE = 0, 3, 4, 5
 """Places in the device's published status: motor torques (3) [N m], number of times its watchdog tripped, its clock
 [s]."""
+_receive = types.ExternalFunction("recv", types.int64(types.int32, types.intp, types.uint64, types.int32))
+_transmit = types.ExternalFunction("send", types.int64(types.int32, types.intp, types.uint64, types.int32))
+_ppoll = types.ExternalFunction("ppoll", types.int32(types.intp, types.uint64, types.intp, types.intp))
+_clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.intp))
+_errno_location = types.ExternalFunction("__errno_location", types.intp())
+
+_MSG_DONTWAIT, _EAGAIN = int(socket.MSG_DONTWAIT), int(errno.EAGAIN)
+_POLLIN = 1 << 32  # POLLIN in `struct pollfd`, after the descriptor
+_CLOCK_MONOTONIC = 1
+NOTHING = -1
+"""Result: there is no packet to receive, or no room to send one."""
+CLOSED = 0
+"""Result: the other end is closed."""
+
+
+@njit
+def monotonic() -> float:
+    """`time.monotonic` [s]."""
+    time = work_integers(2)
+    _clock_gettime(_CLOCK_MONOTONIC, time.ctypes.data)
+    return time[0] + 1e-9 * time[1]
+
+
+@njit
+def receive(descriptor: int, packet: Array) -> int:
+    """Receive the next packet without waiting; returns its size in bytes, `NOTHING` or `CLOSED`."""
+    size = _receive(descriptor, packet.ctypes.data, 8 * len(packet), _MSG_DONTWAIT)
+    if size >= 0:
+        return size
+    return NOTHING if int32_at(_errno_location()) == _EAGAIN else CLOSED
+
+
+@njit
+def transmit(descriptor: int, packet: Array) -> int:
+    """Send a packet without waiting; returns its size in bytes, `NOTHING` or `CLOSED`."""
+    size = _transmit(descriptor, packet.ctypes.data, 8 * len(packet), _MSG_DONTWAIT)
+    if size >= 0:
+        return size
+    return NOTHING if int32_at(_errno_location()) == _EAGAIN else CLOSED
+
+
+@njit
+def wait_for_packet(descriptor: int, seconds: float) -> None:
+    """Wait until there is a packet, at most for a time of less than a second [s]."""
+    polled, time = work_integers(1), work_integers(2)
+    polled[0], time[0], time[1] = descriptor + _POLLIN, 0, int(seconds * 1e9)
+    _ppoll(polled.ctypes.data, 1, time.ctypes.data, 0)
 
 
 class EmulatedEnd(NamedTuple):

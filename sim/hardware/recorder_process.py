@@ -62,11 +62,6 @@ class RecordingJob:
     linkage: Linkage
 
 
-def hardware_groups(period: float) -> dict[str, Group]:
-    """The channels recorded for a servo of a given period [s]: its rows, how many were dropped so far, the twin's."""
-    return {"ticks": Group(1.0 / period, CHANNELS | {"dropped": ()} | TWIN_CHANNELS)}
-
-
 def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: SharedNumbers) -> None:
     """Record until `orders` holds a 1, or the parent process has ended, and no row is left; target of a process.
 
@@ -77,7 +72,9 @@ def record_rows(job: RecordingJob, rows: Ring, orders: SharedNumbers, report: Sh
     twin = Twin(job.scene, job.linkage)
     twin.follow(columns(np.zeros((0, ROW_SIZE))))
     try:
-        with Recorder(job.path, job.config, job.seed, hardware_groups(job.scene.servo_period), job.static) as recorder:
+        # Channels: the servo's rows, how many of them were dropped so far, and the twin's.
+        groups = {"ticks": Group(1.0 / job.scene.servo_period, CHANNELS | {"dropped": ()} | TWIN_CHANNELS)}
+        with Recorder(job.path, job.config, job.seed, groups, job.static) as recorder:
             status[RECORDER_READY] = 1.0
             report.write(status)
             while True:

@@ -5,16 +5,16 @@ import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from controllers.fields.own.own_law import law
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.own_law import PythonLaw, law
 from experiments.config.options import run_config
+from experiments.setups.parts.lap import DEFAULT_LAP
 from sim.errors import SimError
 from sim.loop.loop import Loop
 from tests.loop_with_law import loop_with
 
 CONFIG = run_config(clips=("cheer", "angry"), seconds=0.2)
 AROUND, MODE = CONFIG.map.around, CONFIG.mode
-FOLLOW = Follow(Trajectory.circle(AROUND.radius, AROUND.lap), MODE.stiffness, MODE.damping, MODE.tube)
+FOLLOW = Follow(Trajectory.circle(AROUND.radius, DEFAULT_LAP), MODE.stiffness, MODE.damping, MODE.tube)
 
 
 def _run(program, seconds=0.2):

@@ -13,14 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers.certificates.flight.flight_fit import (
-    MIN_FLIGHT_DURATION,
-    FlightFit,
-    find_flights,
-    fit_flight,
-    fit_free_fall,
-    reachable_rates,
-)
+from controllers.certificates.flight import flight_fit
 from controllers.certificates.flight.tolerance import BallisticTolerance
 from controllers.certificates.report import Outcome, Verdict
 from controllers.errors import ParameterError
@@ -88,7 +81,7 @@ class FlightJudgement:
         Rates at which a body in free fall stays within the tolerance; None if there are none.
     """
 
-    fit: FlightFit
+    fit: flight_fit.FlightFit
     verdict: Outcome
     reason: str
     seen: tuple[float, float]
@@ -105,16 +98,16 @@ class FlightJudgement:
 
 def judge_flights(motion: BodyMotion, tolerance: BallisticTolerance) -> tuple[FlightJudgement, ...]:
     """Find and judge all flights of a motion."""
-    spans = find_flights(motion.supported, motion.fps)
+    spans = flight_fit.find_flights(motion.supported, motion.fps)
     return tuple(_judge(motion, span, tolerance) for span in spans)
 
 
 def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolerance) -> FlightJudgement:
-    fit = fit_flight(span, motion.fps, motion.com, motion.angular, motion.inertia, motion.clearance)
+    fit = flight_fit.fit_flight(span, motion.fps, motion.com, motion.angular, motion.inertia, motion.clearance)
     low, high = tolerance.gravity
     likely = fit.likely_gravity
     seen = (float(np.sqrt(low / likely)), float(np.sqrt(high / likely))) if likely > 0.0 else (np.inf, np.inf)
-    done = reachable_rates(motion.com[span[0] : span[1] + 1], motion.fps, tolerance.distance)
+    done = flight_fit.reachable_rates(motion.com[span[0] : span[1] + 1], motion.fps, tolerance.distance)
     falls = f"falls at {fit.gravity:.1f} ± {fit.uncertainty:.1f} m/s²"
     verdict: Outcome = "refuted"
     if likely < low and fit.clearance < tolerance.clearance:
@@ -143,12 +136,9 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
 
 
 def ballistic_verdict(
-    motion: BodyMotion,
-    flights: Sequence[FlightJudgement],
-    tolerance: BallisticTolerance,
-    doubts: Sequence[str] = (),
+    motion: BodyMotion, flights: Sequence[FlightJudgement], tolerance: BallisticTolerance, doubts: Sequence[str] = (),
     measures: Mapping[str, object] | None = None,
-) -> Verdict:
+) -> Verdict:  # fmt: skip
     """Verdict on a whole motion: that of its worst flight, but unknown if its support may not be real contact.
 
     `doubts` and `measures` are those of `contact_doubts`.
@@ -164,7 +154,7 @@ def ballistic_verdict(
         f"what viewers accept is {tolerance.gravity[0]:g} to {tolerance.gravity[1]:g} m/s²",
         "the gravity of a flight is known to its 95 % interval; within it, the benefit of the doubt",
         "flights are what contacts of feet, hands and other parts leave, of five frames and "
-        f"{MIN_FLIGHT_DURATION} s or more",
+        f"{flight_fit.MIN_FLIGHT_DURATION} s or more",
         f"a turn about the vertical of up to {unnoticed:.0f}° that begins and ends in the air is not noticed",
     )
     figures: dict[str, object] = {**(measures or {})}
@@ -180,7 +170,7 @@ def ballistic_verdict(
     if refuted:
         fit = refuted[0].fit
         com = motion.com[fit.start : fit.end + 1]
-        distance, (position, velocity) = fit_free_fall(com, motion.fps, 1.0)
+        distance, (position, velocity) = flight_fit.fit_free_fall(com, motion.fps, 1.0)
         counterexample = {
             "start": fit.start, "end": fit.end, "position": position, "velocity": velocity,
             "momentum": fit.momentum, "distance": distance,

@@ -89,7 +89,10 @@ def _content_parts(value: object, seen: set[int]) -> Iterator[bytes]:
     elif isinstance(value, _IDENTIFIED_BY_NAME):
         yield f"{getattr(value, '__module__', '')}.{value.__name__}".encode()
     else:
-        yield _pickled(value)
+        try:
+            yield pickle.dumps(value, protocol=4)
+        except (pickle.PicklingError, TypeError, AttributeError, ValueError):
+            yield uuid4().bytes
 
 
 def _names_read(code: CodeType) -> Iterator[str]:
@@ -101,10 +104,3 @@ def _names_read(code: CodeType) -> Iterator[str]:
 
 
 _IDENTIFIED_BY_NAME = (ModuleType, type, BuiltinFunctionType, np.ufunc)
-
-
-def _pickled(value: object) -> bytes:
-    try:
-        return pickle.dumps(value, protocol=4)
-    except (pickle.PicklingError, TypeError, AttributeError, ValueError):
-        return uuid4().bytes

@@ -251,13 +251,9 @@ class Program(Law):
 
     @staticmethod
     def of(
-        law: Law,
-        kernel: Kernel,
-        params: Sequence[float] | Array,
-        memory: Sequence[float] | Array,
-        curve: Trajectory | None = None,
-        feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
-    ) -> "Program":
+        law: Law, kernel: Kernel, params: Sequence[float] | Array, memory: Sequence[float] | Array,
+        curve: Trajectory | None = None, feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
+    ) -> "Program":  # fmt: skip
         """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
 
         The law's memory begins at `TRACE_SIZE`.

@@ -1,19 +1,42 @@
-"""User-defined force laws: the decorator `law` turns a function into a field."""
+"""User-defined force laws: the decorator `law` turns a function into a field, computed in Python or compiled."""
 
 import inspect
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, overload
 
 import numpy.typing as npt
+from numba import njit
 
 from controllers.checks import check_kind
 from controllers.errors import ParameterError
-from controllers.fields.algebra.law import Law
+from controllers.fields.algebra.instructions import TRACE_SIZE
+from controllers.fields.algebra.law import Law, Program, PythonFeed
 from controllers.fields.own.compiled_law import CompiledLaw
-from controllers.fields.own.function_law import place_of
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.function_law import FunctionLaw, place_of
+from geometry.arrays import Array
 
 _Function = Callable[..., npt.ArrayLike]
+
+
+@njit
+def given_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
+    """Kernel of `PythonLaw`: memory [F (3), τ (3)], which Python has written there."""
+    for i in range(6):
+        wrench[i] = memory[slot + i]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PythonLaw(FunctionLaw):
+    """Field computed by a Python function at every tick of the servo.
+
+    It composes like any other law: the loop calls the function between sensing and the compiled rest of the tick. State
+    that the function keeps between ticks is not part of the field's memory. Parameters are those of `FunctionLaw`.
+    """
+
+    def _compose(self) -> Program:
+        feed = PythonFeed(TRACE_SIZE, self.six_numbers)
+        return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))
 
 
 @overload

@@ -10,21 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.config.run_config import RunConfig
+from experiments.live.session import messages
 from experiments.live.session.engine_process import EngineProcess
 from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import with_gain
-from experiments.live.session.messages import (
-    Build,
-    Built,
-    GoBack,
-    Order,
-    Perform,
-    Progress,
-    Record,
-    Refused,
-    Saved,
-    SetGains,
-)
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from geometry.arrays import Array
 from sim.errors import SimError
@@ -57,9 +46,9 @@ class Desk:
     def __init__(self, folder: Path, say: Callable[[str], None]):
         self.folder, self._say = folder, say
         self.engine = EngineProcess()
-        self.built: Built | None = None
+        self.built: messages.Built | None = None
         self.config: RunConfig | None = None
-        self.progress: Progress | None = None
+        self.progress: messages.Progress | None = None
         self.verdict: tuple[GainVerdict, ...] = ()
         self.checking = False
         self.builds = 0
@@ -93,8 +82,8 @@ class Desk:
         self.now = now
 
     def _process_answer(self, answer: object) -> None:
-        self.progress = answer if isinstance(answer, Progress) else None
-        if isinstance(answer, Built):
+        self.progress = answer if isinstance(answer, messages.Progress) else None
+        if isinstance(answer, messages.Built):
             self.built, self.config = answer, answer.config
             self.builds += 1
             self.history.clear()
@@ -102,11 +91,11 @@ class Desk:
             self._request_verdict()
             for remark in answer.remarks:
                 self._say(remark)
-        elif isinstance(answer, Refused):
+        elif isinstance(answer, messages.Refused):
             self._say(answer.text)
             if self.built is not None and self.config is not None and self.config.map == self.built.config.map:
                 self._request_verdict()
-        elif isinstance(answer, Saved):
+        elif isinstance(answer, messages.Saved):
             self._say(f"Take kept in {answer.folder}.")
 
     def _store_in_history(self, now: dict[str, Array]) -> None:
@@ -134,7 +123,7 @@ class Desk:
     def build(self, config: RunConfig) -> None:
         """Build another run; the current one continues until it is ready."""
         self.let_go()
-        self.engine.ask(Build(config))
+        self.engine.ask(messages.Build(config))
 
     def hold(self, target: Array, pressed: bool) -> None:
         """Hold the stylus with a target position in H [m], with its switch pressed or not."""
@@ -182,20 +171,20 @@ class Desk:
     def reset(self) -> None:
         """Return to the beginning."""
         self.let_go()
-        self.engine.ask(Order.RESET)
+        self.engine.ask(messages.Order.RESET)
 
     def go_back(self, seconds_ago: float) -> None:
         """Continue from the last stored state before the time `seconds_ago` [s] ago; one state is stored per second."""
         self.let_go()
-        self.engine.ask(GoBack(float(self.at(seconds_ago)["t"][0])))
+        self.engine.ask(messages.GoBack(float(self.at(seconds_ago)["t"][0])))
 
     def perform(self, now: bool) -> None:
         """Perform the bent curve, or bend it again."""
-        self.engine.ask(Perform(now))
+        self.engine.ask(messages.Perform(now))
 
     def rearm(self) -> None:
         """Clear a latched fault."""
-        self.engine.ask(Order.REARM)
+        self.engine.ask(messages.Order.REARM)
 
     def set_gain(self, name: str, value: float) -> None:
         """Set a gain.
@@ -246,11 +235,11 @@ class Desk:
             self._apply_config(config)
             return
         self._expected_bends = self._bend_count + bends
-        self.engine.ask(Order.REDO if bends > 0 else Order.UNDO)
+        self.engine.ask(messages.Order.REDO if bends > 0 else messages.Order.UNDO)
 
     def _apply_config(self, config: RunConfig) -> None:
         self.config = config
-        self.engine.ask(SetGains(config))
+        self.engine.ask(messages.SetGains(config))
         self._request_verdict()
 
     def _request_verdict(self) -> None:
@@ -285,7 +274,7 @@ class Desk:
             raise SimError(f"a take cannot be named {name!r}; expected letters, digits, space, dot and dash")
         if self.take(name).exists():
             raise SimError(f"there is a take {name!r} already; expected another name")
-        self.engine.ask(Record(self.take(name)))
+        self.engine.ask(messages.Record(self.take(name)))
 
     def watched(self, browsers: int) -> None:
         """Called periodically with the number of browsers; after `UNATTENDED_TIMEOUT` without one, a take is ended."""
@@ -299,7 +288,7 @@ class Desk:
 
     def stop(self) -> None:
         """End the take; it is measured and saved."""
-        self.engine.ask(Order.STOP)
+        self.engine.ask(messages.Order.STOP)
 
     def upload(self, name: str, content: bytes) -> None:
         """Have a motion file prepared in a separate process.

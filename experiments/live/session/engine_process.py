@@ -11,24 +11,8 @@ import numpy as np
 from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
 from controllers.safety.faults import FAULT_CODE, FAULT_VALUE
 from controllers.state import HAND_POSITION, HAND_SWITCH, POSITION, VELOCITY
+from experiments.live.session import messages
 from experiments.live.session.engine import Drag, Engine
-from experiments.live.session.messages import (
-    COURSE_POINTS,
-    HELD,
-    SHOWN,
-    SLICE_SIDE,
-    Board,
-    Build,
-    Built,
-    GoBack,
-    Order,
-    Perform,
-    Progress,
-    Record,
-    Refused,
-    Saved,
-    SetGains,
-)
 from experiments.live.session.takes import Take
 from experiments.live.session.workers import PageProcess
 from experiments.setups.session import Session, default_poses
@@ -55,15 +39,15 @@ class EngineProcess(PageProcess):
     """The page's handle of the engine's process: boards to read and write, and a queue in each direction."""
 
     def __init__(self) -> None:
-        shown, held = Board.memory(SHOWN), Board.memory(HELD)
-        self.shown, self.held = Board(shown, SHOWN), Board(held, HELD)
+        shown, held = messages.Board.memory(messages.SHOWN), messages.Board.memory(messages.HELD)
+        self.shown, self.held = messages.Board(shown, messages.SHOWN), messages.Board(held, messages.HELD)
         self.held.write({"pace": 1.0})
         # Not a daemon, as it starts compiler processes.
         super().__init__(_main, (shown, held), daemon=False, name="hvf-servo")
 
     def close(self) -> None:
         """End the process; a take in progress is saved."""
-        self.ask(Order.QUIT)
+        self.ask(messages.Order.QUIT)
         self._process.join(30.0)
         if self._process.is_alive():
             self._process.kill()
@@ -72,13 +56,13 @@ class EngineProcess(PageProcess):
 
 
 def _main(shown: Any, held: Any, orders: Any, answers: Any) -> None:
-    _EngineLoop(Board(shown, SHOWN), Board(held, HELD), orders, answers).run()
+    _EngineLoop(messages.Board(shown, messages.SHOWN), messages.Board(held, messages.HELD), orders, answers).run()
 
 
 class _EngineLoop:
     """The loop of the process: execute orders, run a block, send a picture, wait for the wall clock."""
 
-    def __init__(self, shown: Board, held: Board, orders: Any, answers: Any):
+    def __init__(self, shown: messages.Board, held: messages.Board, orders: Any, answers: Any):
         self._shown, self._held, self._orders, self._answers = shown, held, orders, answers
         self._engine: Engine | None = None
         self._take: Take | None = None
@@ -131,7 +115,7 @@ class _EngineLoop:
                 self._take.add(logs, engine)
             except DiskFull as error:
                 self._take = None
-                self._answers.put(Refused(str(error)))
+                self._answers.put(messages.Refused(str(error)))
         self._send_picture()
 
     def _process_orders(self) -> None:
@@ -143,12 +127,12 @@ class _EngineLoop:
             try:
                 self._execute(order)
             except (HvfError, OSError) as error:
-                self._answers.put(Refused(str(error)))
+                self._answers.put(messages.Refused(str(error)))
 
     def _execute(self, order: object) -> None:
-        if isinstance(order, Build):
+        if isinstance(order, messages.Build):
             self._build(order)
-        elif order is Order.QUIT:
+        elif order is messages.Order.QUIT:
             self._is_running = False
         elif self._engine is not None:
             self._update_drag(self._engine)
@@ -156,24 +140,24 @@ class _EngineLoop:
             self._curve_changed = True
 
     def _execute_on_engine(self, order: object, engine: Engine) -> None:
-        if order in (Order.RESET, Order.STOP) or isinstance(order, GoBack | Record):
+        if order in (messages.Order.RESET, messages.Order.STOP) or isinstance(order, messages.GoBack | messages.Record):
             self._stop(engine)  # a take must be continuous in time
         match order:
-            case SetGains(config):
+            case messages.SetGains(config):
                 engine.set_gains(config)
-            case GoBack(t):
+            case messages.GoBack(t):
                 engine.back_to(t)
-            case Perform(now):
+            case messages.Perform(now):
                 engine.perform(now)
-            case Record(folder):
+            case messages.Record(folder):
                 self._take = Take(folder, engine)
-            case Order.RESET:
+            case messages.Order.RESET:
                 engine.reset()
-            case Order.UNDO:
+            case messages.Order.UNDO:
                 engine.undo()
-            case Order.REDO:
+            case messages.Order.REDO:
                 engine.redo()
-            case Order.REARM:
+            case messages.Order.REARM:
                 engine.rearm()
             case _:
                 pass
@@ -182,16 +166,16 @@ class _EngineLoop:
         if self._take is None:
             return
         take, self._take = self._take, None
-        self._answers.put(Progress("saving the take", 0.5))
+        self._answers.put(messages.Progress("saving the take", 0.5))
         try:
-            self._answers.put(Saved(take.folder, take.end(engine)))
+            self._answers.put(messages.Saved(take.folder, take.end(engine)))
         except (SimError, OSError) as error:
-            self._answers.put(Refused(str(error)))
+            self._answers.put(messages.Refused(str(error)))
 
-    def _build(self, order: Build) -> None:
+    def _build(self, order: messages.Build) -> None:
         if self._engine is not None:
             self._stop(self._engine)
-        self._answers.put(Progress("setting up the run", 0.1))
+        self._answers.put(messages.Progress("setting up the run", 0.1))
         session = wire(order.config, ready=self._compile)
         self._engine = Engine(session)
         self._poses = None if session.parts.maps.plays_rivers else default_poses(session)
@@ -208,10 +192,10 @@ class _EngineLoop:
         def report_progress(unit: Unit) -> None:
             nonlocal done
             done += 1
-            self._answers.put(Progress(f"{prefix}: {done} of {len(missing)}", done / len(missing)))
+            self._answers.put(messages.Progress(f"{prefix}: {done} of {len(missing)}", done / len(missing)))
 
         if missing:
-            self._answers.put(Progress(f"{prefix}: 0 of {len(missing)}; it takes a minute or two", 0.02))
+            self._answers.put(messages.Progress(f"{prefix}: 0 of {len(missing)}; it takes a minute or two", 0.02))
             compile_units(missing, report_progress)
 
     def _send_picture(self) -> None:
@@ -265,7 +249,7 @@ class _EngineLoop:
 
 def slice_points(height: float) -> Array:
     """Grid points in a horizontal plane at a height in H [m], shape (81, 3)."""
-    side = np.linspace(-0.5 * SLICE_WIDTH, 0.5 * SLICE_WIDTH, SLICE_SIDE)
+    side = np.linspace(-0.5 * SLICE_WIDTH, 0.5 * SLICE_WIDTH, messages.SLICE_SIDE)
     x, y = np.meshgrid(side, side)
     return np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1)
 
@@ -273,14 +257,14 @@ def slice_points(height: float) -> Array:
 def _curve_points(engine: Engine) -> Array:
     """Points of the curve as currently bent, in H [m], shape (241, 3)."""
     curve = engine.session.curve if engine.tubes is None else engine.tubes.edited(engine.memory)
-    return curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
+    return curve.point(np.linspace(curve.start, curve.end, messages.COURSE_POINTS))
 
 
-def _built_message(session: Session, engine: Engine) -> Built:
+def _built_message(session: Session, engine: Engine) -> messages.Built:
     static = session.static()
     names = ("curve", "river_names", "river_curves", "tube_radius", "tube_name", "title", "figure", "p_WH", "scene")
-    assert configuration_size(session.servo) <= SHOWN["qpos"]
-    return Built(
+    assert configuration_size(session.servo) <= messages.SHOWN["qpos"]
+    return messages.Built(
         engine.config,
         {name: static[name] for name in names if name in static},
         engine.tubes is not None,

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from controllers.safety.faults import Fault, LatchedFault
 from experiments.results.folder import has_animation, scene_of
 from experiments.results.measures.arm_summary import arm_summary
-from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS
+from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS, ROWS
 from experiments.results.measures.changes import river_changes
-from experiments.results.measures.faults import fault_lines
 from experiments.results.measures.figure_measure import FigureMeasure, MeanSquare
 from experiments.results.measures.oscillation import oscillation_summary
 from experiments.results.measures.soles import Soles
@@ -42,12 +42,9 @@ _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "g
 
 
 def summarise(
-    recording: Recording,
-    default_poses: Callable[[Array, Array, Array], Array],
-    speed: SpeedSummary,
-    warnings: dict[str, int],
-    handled: Sequence[Span] = (),
-) -> RunSummary:
+    recording: Recording, default_poses: Callable[[Array, Array, Array], Array], speed: SpeedSummary,
+    warnings: dict[str, int], handled: Sequence[Span] = (),
+) -> RunSummary:  # fmt: skip
     """Measure a run in constant memory.
 
     Parameters
@@ -269,3 +266,23 @@ class AnimationMeasure:
         return AnimationSummary(
             math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide, self._fastest
         )
+
+
+def fault_lines(recording: Recording) -> tuple[str, ...]:
+    """A line for each latched fault, in order of time, and one for the ticks that came late."""
+    ticks = recording.groups["ticks"]
+    if "fault" not in ticks:
+        return ()
+    lines: list[str] = []
+    before, gaps = 0.0, 0
+    for first in range(0, len(ticks["t"]), ROWS):
+        rows = slice(first, first + ROWS)
+        codes, gaps = ticks["fault"][rows], int(ticks["gaps"][rows][-1])
+        changes = np.flatnonzero(np.diff(codes, prepend=before) != 0.0)
+        for row in changes[codes[changes] != 0.0]:
+            t, value = float(ticks["t"][rows][row]), float(ticks["fault_value"][rows][row])
+            lines.append(LatchedFault(Fault(int(codes[row])), t, value).line())
+        before = float(codes[-1])
+    if gaps:
+        lines.append(f"The servo was late {gaps} times; the force was released and ramped in again.")
+    return tuple(lines)

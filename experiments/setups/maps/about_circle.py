@@ -1,7 +1,6 @@
 """Maps of clips about a circle: their place, the motions that they take, their pace in a lap, the parts of a run."""
 
 from collections.abc import Sequence
-from functools import cache, partial
 from typing import NamedTuple
 
 from controllers.curves.cylinder import AXIS
@@ -14,7 +13,7 @@ from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendabl
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.lap import circle_of
-from experiments.setups.parts.pace import check_reach, course_of
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
@@ -71,7 +70,7 @@ def about_circle(
         haptic_map=haptic_map, clips=clips, curve=curve, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
-        course=cache(partial(course_of, curve)), moves=True, expressive=place.expressive,
+        moves=True, expressive=place.expressive,
         remarks=(*not_blendable(clips), *off),
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Set-up of maps from files, lifted ones among them."""
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -27,7 +27,6 @@ from experiments.setups.modes.lifted_runs import (
     lifted_curve,
 )
 from experiments.setups.parts.lap import DEFAULT_LAP
-from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
@@ -84,7 +83,6 @@ def lifted_parts(haptic_map: Lifted, clips: tuple[Clip, ...], part: MapFile) -> 
         haptic_map=haptic_map, clips=clips, curve=curve, reach=part.reach,
         rivers=lambda mode: lifted_choice(haptic_map, mode),
         river_pushes=lambda mode, seconds: default_pushes(haptic_map, part.curve, mode),
-        course=cache(partial(course_of, curve)),
         expressive=part.expressive, gains=HELD_GAINS, moves=True, carry=LIFTED_CARRY,
         curve_clip_seconds=curve.duration,
         remarks=between if curve.periodic else (ends, *between),

@@ -11,7 +11,7 @@ from controllers.motion.strides import fit_to_lap
 from experiments.config.maps import RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.fitting.blendable import closed_loops, keep_own_pace, largest_pace_error, same
+from experiments.fitting.blendable import closed_loops, keep_own_pace, same
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
@@ -71,5 +71,6 @@ def _fit_round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bo
             fitted = fit_to_lap(loops, laps * lap, apart)
             if keep_own_pace(played, fitted, laps * lap):
                 return laps, apart
-            best = min(best, (largest_pace_error(fitted, laps * lap), laps, apart))
+            error = max(abs(float(np.log(loop.duration / (laps * lap)))) for loop in fitted)
+            best = min(best, (error, laps, apart))
     return best[1:]

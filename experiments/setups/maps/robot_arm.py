@@ -1,6 +1,5 @@
 """A robot arm of seven joints in place of the figure: the map's parts, for the same fields and the same loop."""
 
-from functools import cache, partial
 from typing import cast
 
 import mujoco
@@ -11,11 +10,9 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
-from experiments.config.maps import RobotArm
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
-from experiments.setups.parts.lap import circle_of
-from experiments.setups.parts.pace import check_reach, course_of
+from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
@@ -31,11 +28,6 @@ _TURN_RANGE = (np.radians(15.0), np.radians(25.0))  # [rad] the same for the rot
 _ARM_ANGLE = np.radians(30.0)  # ψ of `controllers.haptic_map.robot_arm.RobotArm` [rad]
 _SAMPLE_COUNT = 241  # samples of a curve in the search for its farthest point
 _CIRCLE_TILT = np.radians(30.0)  # of the default circle, towards the user
-
-
-def robot_arm_parts(arm: mujoco.MjModel, part: RobotArm) -> ClipMapParts:
-    """Map parts of a configured robot arm, along a tilted circle."""
-    return arm_parts(arm, tilted(circle_of(part)), part.reach, part.scale)
 
 
 def robot_arm_map(arm: mujoco.MjModel, scale: float) -> RobotArmMap:
@@ -85,7 +77,6 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
         haptic_map=cast(ClipMap, haptic_map), clips=(), curve=curve, reach=reach, turning=True, refined=refined,
         rivers=lambda mode: default_choice(mode, curve, reach),
         river_pushes=lambda mode, seconds: river_pushes(curve, seconds),
-        course=cache(partial(course_of, curve)),
         static={"tool_home": HOME + np.array([0.0, 0.0, PEDESTAL]), "tool_scale": scale},
     )  # fmt: skip
 

@@ -24,6 +24,7 @@ from experiments.results.measures.run_measures import trace_summary
 from experiments.setups.parts.budget import fastest, tank_for
 from experiments.setups.parts.governor import governed
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
+from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
@@ -141,7 +142,7 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "follow"."""
     parallel = mode.flow == "parallel"
     # With a parallel flow a hand that runs outside a bend needs no course that is faster there.
-    course = maps.course(mode.damping, 0.0 if parallel else mode.stiffness)
+    course = course_of(maps.curve, mode.damping, 0.0 if parallel else mode.stiffness)
     law = FollowLaw(course, mode.stiffness, mode.damping, mode.tube, parallel)
     law, urged = governed(mode.governor, law, course, maps)
     power = river_power(mode.damping, (PACE_RANGE[1] if parallel else 1.0) * fastest(course))

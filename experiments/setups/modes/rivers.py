@@ -17,7 +17,7 @@ from experiments.setups.parts.budget import fastest
 from experiments.setups.parts.defaults import river_gains
 from experiments.setups.parts.governor import governed, speeds_along
 from experiments.setups.parts.hands import MIN_PUSHED_RIVER_SPEED
-from experiments.setups.parts.pace import paced
+from experiments.setups.parts.pace import course_of, paced
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
 
 # In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
@@ -42,7 +42,7 @@ WAVE_FRACTION = 0.6  # height of the wave as a share of the map's half width
 def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "rivers"."""
     stiffness, damping = river_gains(mode)
-    course, choice, urged = maps.course(damping, stiffness), maps.rivers(mode), 0.0
+    course, choice, urged = course_of(maps.curve, damping, stiffness), maps.rivers(mode), 0.0
     if mode.governor is not None and gates_rivers(mode.crossing):
         law = law_of(mode, gated(choice, maps), GATE_ADMISSION)
     else:

@@ -19,18 +19,11 @@ from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary import RunSummary
 from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
+from experiments.setups.parts import hands
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
 from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
-from experiments.setups.parts.hands import (
-    PAUSE_TIME,
-    edited_until,
-    first_pushed_lap,
-    handling_spans,
-    resolved_user,
-    turning_remark,
-    user_hand,
-)
+from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
 from geometry.arrays import Array
 from models.mocap.dynamics.contacts import contacts
@@ -55,9 +48,9 @@ def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch-then-follow": FOLLOW on the bent curve once the last grab is over."""
-    course = maps.course(mode.damping, mode.stiffness)
+    course = course_of(maps.curve, mode.damping, mode.stiffness)
     user = _resolve_user(config, mode, maps)
-    until = edited_until(user.grabs)
+    until = hands.edited_until(user.grabs)
     carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)
     power = river_power(mode.damping, fastest(course) + _MAX_BUMP_SLOPE * carried / mode.bump)
     late = f"the curve is bent until {until:.1f} s and performed then; give --seconds more than that"
@@ -84,7 +77,7 @@ def _resolve_user(config: RunConfig, mode: StretchyTube, maps: ClipMapParts) -> 
     if config.user.person is not None:  # a person makes no clicks without a place
         by_default = tuple(grab for grab in by_default if grab.place is not None)
     grabs = config.user.grabs or by_default
-    return resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
+    return hands.resolved_user(config.user, maps.curve, config.seconds, grabs=grabs)
 
 
 def _make_parts(
@@ -106,7 +99,7 @@ def _make_parts(
         epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE_TIME,
         hold=mode.rubber_from,
     )  # fmt: skip
-    pushed = first_pushed_lap(maps.curve, user.grabs)
+    pushed = hands.first_pushed_lap(maps.curve, user.grabs)
     if user.does == "push" and not config.user.pushes and config.seconds <= pushed and not remarks:
         remarks = (f"the hand bends the curve first and pushes from {pushed:.1f} s on; give --seconds more than that",)
     # A press of the switch replaces the seeking spring by the rubber; its energy is allowed once a second.
@@ -125,13 +118,13 @@ def _make_parts(
     return Parts(
         config=replace(config, user=user), maps=maps, field=tubes,
         program=with_walls(tubes.program(), mode.walls, maps), course=course,
-        user=user_hand(user, maps.curve, config.seconds, config.seed),
+        user=hands.user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
         gains=HELD_GAINS, bends=True, held_seconds=float(np.nan_to_num(maps.lap_seconds)),
-        handled=handling_spans(user), summarise=summarise,
+        handled=hands.handling_spans(user), summarise=summarise,
         # Bending keeps the phases, so the unedited animation is that at the same phase of the given curve.
         argument_at=lambda nearest, phases: stylus_path(course.point(phases)),
-        remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + turning_remark(user, maps.oriented),
+        remarks=flight_remarks(maps.clips, config.figure.kind) + remarks + hands.turning_remark(user, maps.oriented),
     )  # fmt: skip
 
 
@@ -191,7 +184,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     )
     grabs: list[Grab] = []
     for carry, duration, hold, place in actions:
-        start = grabs[-1].end + PAUSE_TIME if grabs else PAUSE_TIME
+        start = grabs[-1].end + hands.PAUSE_TIME if grabs else hands.PAUSE_TIME
         reached = None if place is None else _as_tuple(place)
         grabs.append(Grab(start, _as_tuple(carry), duration, hold, reached, REACH_TIME))
     return tuple(grabs)

@@ -8,6 +8,8 @@ that takes the angle for the clip's phase plays more slowly. Flights are sensiti
 tenths of its speed needs eight tenths of gravity, and one whose pace changes by a hundredth lands a centimetre off.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from controllers.checks import check_kind, checked
@@ -147,6 +149,7 @@ def check_reach(curve: Trajectory) -> Trajectory:
     return curve
 
 
+@lru_cache(maxsize=16)
 def course_of(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     """The curve along which a field leads so that the hand has the pace of `curve`: `paced`, or itself without drag.
 

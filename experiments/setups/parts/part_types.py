@@ -167,8 +167,6 @@ class ClipMapParts(MapParts[ClipMap]):
         Maps a mode to its rivers.
     river_pushes : callable
         Maps the mode and the duration of the run [s] to the pushes of a hand that changes over to another river.
-    course : callable
-        Maps damping [N s/m] and stiffness [N/m] of a field to the curve along which the field leads.
     carry : float
         Factor on the default distances by which a hand bends a curve.
     curve_clip_seconds : float, optional
@@ -178,7 +176,6 @@ class ClipMapParts(MapParts[ClipMap]):
     reach: float
     rivers: Callable[[Rivers], RiverChoice]
     river_pushes: Callable[[Rivers, float], tuple[Push, ...]]
-    course: Callable[[float, float], Trajectory]
     carry: float = 1.0
     curve_clip_seconds: float | None = None
 

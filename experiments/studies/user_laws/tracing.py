@@ -3,14 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import isotonic_regression
+from scipy.optimize import isotonic_regression, minimize
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import norm
 
 from experiments.studies.user_laws.bare_device import PERIOD, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from geometry.arrays import Array
-from sim.users.person.pace import natural_times
 from sim.users.person.person import Person
 from sim.users.person.wishes import Wishes, following
 
@@ -24,6 +23,7 @@ MIN_LAPS = 5  # fewest of these that go all the way round, at a pace that the pe
 ELLIPSES = ((0.04, 0.024), (0.04, 0.016), (0.03, 0.01))  # half axes [m]
 ELLIPSE_TIMES = (1.5, 2.5)  # durations of a lap [s]
 _SAMPLE_TIME, _CUTOFF = 0.01, 6.0  # [s] between wishes; [Hz] of the filter before curvature, below the tremor
+_N_HARMONICS = 6  # Fourier terms of the logarithm of the speed along a lap
 
 
 def steering(people: Sequence[Person], seed: int) -> Study:
@@ -131,3 +131,41 @@ def _curvature(trace: Trace, lap: float) -> tuple[Array, Array]:
     kept = slice(round(lap / PERIOD), -200)
     well = (kappa[kept] > 1.0) & (speed[kept] > 0.005)
     return kappa[kept][well], speed[kept][well]
+
+
+def natural_times(points: Array, seconds: float) -> Array:
+    r"""Times [s], shape (n,), at which a closed path of a given duration passes its points (n, 3) with minimum jerk.
+
+    .. math:: \min_{s(t)} \int_0^T \left|\frac{d^3}{dt^3} x(s(t))\right|^2 dt
+
+    The last point must equal the first. The speed along the path is exp of a Fourier series in arc length. Smoothness
+    along a predefined path predicts the speed profiles of people (Todorov & Jordan 1998).
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = np.concatenate(([0.0], np.cumsum(steps)))
+    angle = 2.0 * np.pi * length / length[-1]
+    waves = np.concatenate([[np.cos(k * angle), np.sin(k * angle)] for k in range(1, _N_HARMONICS + 1)])
+    n = len(points) - 1
+    even = np.arange(n) / n
+
+    def times(coefficients: Array) -> Array:
+        slowness = np.exp(-coefficients @ waves)
+        cumulative_time = np.concatenate(([0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * steps)))
+        return cumulative_time / cumulative_time[-1]
+
+    frequencies = np.fft.fftfreq(n, 1.0 / n)[:, None]
+
+    def jerk(coefficients: Array) -> float:
+        at = times(coefficients)
+        x = np.stack([np.interp(even, at, points[:, k]) for k in range(points.shape[1])], axis=1)
+        # Low frequencies only, since the path between its points is not known.
+        spectrum = np.where(np.abs(frequencies) <= 4 * _N_HARMONICS, np.fft.fft(x, axis=0), 0.0)
+        return float(np.sum(np.abs(frequencies**3 * spectrum) ** 2))
+
+    initial_jerk = jerk(np.zeros(2 * _N_HARMONICS))
+
+    def relative_jerk(c: Array) -> float:
+        return jerk(c) / initial_jerk
+
+    solution = minimize(relative_jerk, np.zeros(2 * _N_HARMONICS), method="L-BFGS-B")
+    return seconds * times(solution.x)

@@ -2,23 +2,27 @@
 
 import html
 import math
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
-from experiments.trials.analysis.plots import effects_figure, levels_figure
-from experiments.trials.analysis.replays import Replay, replays
+from experiments.results.folder import RECORDING, world_of
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.analysis.trial_table import measured_columns
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
-from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
+from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, TrialLog
+from experiments.trials.trial.run_trial import MapCache, run_recorded
 from sim.compilation.whole_files import write_text
+from sim.recording.recording import Recording
+from sim.viewer.replay_html import replay_html
 
 _BODY = """<p>{question}</p>
 {sentences}
@@ -41,6 +45,46 @@ users. Grey: no difference is shown. {interactions}</p>
 <pre>{study}</pre>
 <p class="note">{provenance}</p>
 """
+_USER_COLOUR, _MEAN_COLOUR = "#9aa6b8", "#1f5fbf"
+
+
+class Replay(NamedTuple):
+    """Replay of a trial: which one it is and why it is shown, and the replay, a complete HTML document."""
+
+    title: str
+    page: str
+
+
+def chosen_trials(frame: Any, measure: str) -> dict[str, int]:
+    """Row numbers of the median and the worst trial by a measure; empty if no trial has the measure."""
+    values = frame.loc[frame["state"].eq("done"), measure].dropna().sort_values(kind="stable")
+    if not len(values):
+        return {}
+    worst = values.index[-1 if MEASURES[measure].better == "less" else 0]
+    return {"median": int(values.index[len(values) // 2]), "worst": int(worst)}
+
+
+def replays(trials: tuple[Trial, ...], frame: Any, measure: str) -> tuple[Replay, ...]:
+    """Run the median and the worst trial again, recorded, and make their replays."""
+    shown: list[Replay] = []
+    for rank, row in chosen_trials(frame, measure).items():
+        trial, value = trials[row], float(frame[measure].iloc[row])
+        design = trial.design
+        levels = ", ".join(f"{factor} {level}" for factor, level in design.condition.levels.items())
+        title = (
+            f"The {rank} trial by {MEASURES[measure].label}, {value:.3g}: user {design.user}, {levels}, repetition "
+            f"{design.repetition + 1}"
+        )
+        shown.append(Replay(title, _replay_page(trial)))
+    return tuple(shown)
+
+
+def _replay_page(trial: Trial) -> str:
+    session = MapCache().session(trial.config)
+    with tempfile.TemporaryDirectory(prefix="hvf-") as folder:
+        run_recorded(trial.config, session, TrialLog(session.servo, session.world), Path(folder))
+        with Recording(Path(folder) / RECORDING) as recording:
+            return replay_html(recording, world_of(recording))
 
 
 def _page(
@@ -165,3 +209,49 @@ def write_report(
     columns = [field.name for field in fields(Contrast)]
     pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)
     return found, said
+
+
+def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence[str], measure: str) -> Figure:
+    """Every user's mean at every level, a panel for each combination of the other factors' levels."""
+    done = frame[frame["state"].eq("done") & frame[measure].notna()]
+    panels: list[tuple[str, Any]] = [("", done)]
+    if rest:
+        panels = [(", ".join(map(str, name)), part) for name, part in done.groupby(list(rest), sort=False)]
+    figure = Figure(figsize=(3.2 * len(panels) + 0.8, 3.4), layout="constrained")
+    axes: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for axis, (title, part) in zip(axes, panels, strict=True):
+        means = part.groupby(["user", factor])[measure].mean().unstack().reindex(columns=list(levels))
+        for values in means.to_numpy():
+            axis.plot(range(len(levels)), values, color=_USER_COLOUR, lw=0.8, marker="o", ms=3, alpha=0.7)
+        axis.plot(range(len(levels)), means.mean(), color=_MEAN_COLOUR, lw=0, marker="_", ms=28, mew=3)
+        axis.set_xticks(range(len(levels)), list(levels))
+        axis.set_title(title, fontsize=10)
+        axis.set_xlim(-0.5, len(levels) - 0.5)
+        axis.grid(axis="y", alpha=0.3)
+    axes[0].set_ylabel(MEASURES[measure].label)
+    return figure
+
+
+def effects_figure(found: Statistics, factor: str) -> Figure | None:
+    """Effect sizes of all measures, by level of a factor; None if there are none."""
+    contrasts = [c for c in found.contrasts if c.factor == factor and np.isfinite(c.effect)]
+    if not contrasts:
+        return None
+    rows: Mapping[tuple[str, str], Contrast] = {(c.measure, c.level): c for c in contrasts}
+    measures = list(dict.fromkeys(c.measure for c in contrasts))
+    levels = list(dict.fromkeys(c.level for c in contrasts))
+    figure = Figure(figsize=(7.0, 0.42 * len(measures) + 1.2), layout="constrained")
+    axis = figure.subplots()
+    for k, level in enumerate(levels):
+        values = [rows[m, level].effect if (m, level) in rows else np.nan for m in measures]
+        places = np.arange(len(measures)) + 0.8 * ((k + 0.5) / len(levels) - 0.5)
+        axis.barh(places, values, height=0.7 / len(levels), label=level)
+    axis.set_yticks(range(len(measures)), [MEASURES[m].name.replace("_", " ") for m in measures])
+    axis.invert_yaxis()
+    axis.axvline(0.0, color="#333", lw=0.8)
+    axis.set_xscale("symlog", linthresh=1.0)
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_xlabel(f"d_z or g, from {contrasts[0].reference!r}\n(linear within ±1; large where users are alike)")
+    figure.legend(loc="outside upper center", ncols=min(4, len(levels)), frameon=False, fontsize=9)
+    axis.grid(axis="x", alpha=0.3)
+    return figure

@@ -79,18 +79,17 @@ def trial_key(config: RunConfig) -> str:
     StudyError
         If a file that it names does not exist.
     """
-    text = to_json(resolved(config))
-    files = [f"{name} {file_digest(name)}" for name in files_of(config)]
-    return hashlib.sha256("\n".join([code_hash(), text, *files]).encode()).hexdigest()[:32]
+    files = [f"{name} {file_digest(name)}" for name in files_of(config)]  # first: refuses files that do not exist
+    return hashlib.sha256("\n".join([code_hash(), to_json(resolved(config)), *files]).encode()).hexdigest()[:32]
 
 
 @cache
-def code_hash() -> str:
-    """Hash of the code that a trial reaches, and of the versions of Python and the libraries, 16 hex digits.
+def code_hash(module: str = _TRIAL_MODULE) -> str:
+    """Hash of the code that a trial, or another module, reaches, and of Python and the libraries, 16 hex digits.
 
     Analysis and plots of a study are not included; nor is the processor, which a row names separately.
     """
-    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(_TRIAL_MODULE).items())]
+    parts = [sys.version_info[:2], [version(name) for name in _LIBRARIES], sorted(reached_code(module).items())]
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 

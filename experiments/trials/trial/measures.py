@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import mujoco
 import numpy as np
 
 from experiments.config.run_config import PERSON_INTENTS, RunConfig
-from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
 from experiments.results.measures.run_measures import SETTLING_TIME
 from experiments.results.measures.smoothness import (
     SPEED_RATE,
@@ -22,6 +22,8 @@ from experiments.results.measures.smoothness import (
 )
 from experiments.setups.session import Session, default_poses
 from geometry.arrays import Array, Mask
+from models.mocap.motion.clip import pose_difference
+from models.mocap.motion.kinematics import global_rotations, segment_positions
 from sim.body.falls import UP
 from sim.body.figure_state import FigureState
 from sim.body.residual import MIN_GROUND_FORCE
@@ -30,6 +32,7 @@ from sim.loop.servo import FrameLog, Servo, TickLog
 from sim.world.world import World
 
 _TICK_CHANNELS = ("t", "p", "v", "user", "force", "phase", "nearest", "distance", "river", "fault")
+ROOT_WEIGHT = 1.0  # [rad/m] weight of the root's displacement in the product metric
 
 
 class TrialLog:
@@ -238,3 +241,23 @@ def _figure_measures(frames: Mapping[str, Array], weight: float) -> dict[str, fl
 
 def _rms(values: Array) -> float:
     return math.sqrt(float(np.mean(values**2))) if len(values) else _NAN
+
+
+def geodesic_distance(poses: Array, others: Array) -> Array:
+    r"""Length of the shortest path in D between poses, shapes (n, 75) → (n,) [rad].
+
+    .. math:: d(q, q')^2 = (x - x')^2 + \sum_{i=1}^{18} |\log(R_i^{-1} R_i')|^2
+
+    D = R³ × SO(3)^18 is the configuration space of the paper's figure (section 2.2): position and rotation of the root,
+    and 17 joints. A product metric needs a length for an angle: here a metre counts as a radian.
+    """
+    difference = pose_difference(poses, others)
+    difference[:, :3] *= ROOT_WEIGHT
+    return np.linalg.norm(difference, axis=1)
+
+
+def seen_distance(poses: Array, others: Array, figure: mujoco.MjModel) -> Array:
+    """RMS over the 18 segments of the distance between their origins in space, shapes (n, 75) → (n,) [m]."""
+    places = [segment_positions(each[:, :3], global_rotations(each), figure) for each in (poses, others)]
+    apart = places[0] - places[1]
+    return np.sqrt(np.mean(np.sum(apart**2, axis=2), axis=1))

@@ -121,10 +121,9 @@ def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
             yield line, fields
 
 
-def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - one branch per section of the file
+def _read_asf(path: Path) -> _Skeleton:
     """Parse an ASF file."""
-    root = _Bone("root")
-    skeleton = _Skeleton({"root": root}, {}, [0.0, 0.0, 0.0], True, 1.0)
+    skeleton = _Skeleton({"root": _Bone("root")}, {}, [0.0, 0.0, 0.0], True, 1.0)
     section, bone, in_bone = "", None, False
     for line, fields in _fields(path):
         keyword = fields[0].lower()
@@ -135,12 +134,7 @@ def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - one branch per section o
                     path, line, f"section {quoted(fields[0])}", ":units, :root, :bonedata, :hierarchy"
                 )
         elif section == "units" and len(fields) >= 2:
-            if keyword == "length":
-                skeleton.length_unit = number(fields[1], path, line)
-                if skeleton.length_unit <= 0.0:
-                    raise MotionFileError(path, line, f"unit of length is {quoted(fields[1])}", "a positive number")
-            elif keyword == "angle":
-                skeleton.degrees = fields[1].lower().startswith("deg")
+            _read_unit(skeleton, keyword, fields[1], path, line)
         elif section == "root":
             _read_root_line(skeleton, fields, path, line)
         elif section == "bonedata":
@@ -154,16 +148,15 @@ def _read_asf(path: Path) -> _Skeleton:  # noqa: C901 - one branch per section o
                 _read_bone_line(bone, fields, path, line)
         elif section == "hierarchy" and keyword not in ("begin", "end"):
             _read_children(skeleton, fields, path, line)
-    if len(skeleton.parents) != len(skeleton.bones) - 1 or not skeleton.parents:
-        orphan = next(
-            (name for name in skeleton.bones if name not in skeleton.parents and name != "root"), "every bone"
-        )
-        raise MotionFileError(path, 0, f"{quoted(orphan)} is not in the hierarchy", "a parent for every bone")
     return _order_from_root(skeleton, path)
 
 
 def _order_from_root(skeleton: _Skeleton, path: Path) -> _Skeleton:
     """The skeleton with every bone after its parent, whatever the order of its hierarchy's lines."""
+    orphans = [name for name in skeleton.bones if name not in skeleton.parents and name != "root"]
+    if orphans or not skeleton.parents:
+        what = f"{quoted((orphans or ['every bone'])[0])} is not in the hierarchy"
+        raise MotionFileError(path, 0, what, "a parent for every bone")
     ordered, remaining = dict[str, str](), skeleton.parents
     while remaining:
         waiting = dict[str, str]()
@@ -185,6 +178,15 @@ def _new_bone(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> 
         raise MotionFileError(path, line, "too many bones", f"at most {JOINT_LIMIT}")
     skeleton.bones[fields[1]] = bone = _Bone(fields[1])
     return bone
+
+
+def _read_unit(skeleton: _Skeleton, keyword: str, unit: str, path: Path, line: int) -> None:
+    if keyword == "length":
+        skeleton.length_unit = number(unit, path, line)
+        if skeleton.length_unit <= 0.0:
+            raise MotionFileError(path, line, f"unit of length is {quoted(unit)}", "a positive number")
+    elif keyword == "angle":
+        skeleton.degrees = unit.lower().startswith("deg")
 
 
 def _read_root_line(skeleton: _Skeleton, fields: list[str], path: Path, line: int) -> None:

@@ -156,9 +156,11 @@ class _Tokens:
                 )
         return " ".join(words)
 
-    def joint(self, parent: int) -> _Joint:
+    def joint(self, parent: int, index: int) -> _Joint:
         """A new joint, after the word ROOT or JOINT was read."""
         line = self.line
+        if index >= JOINT_LIMIT:
+            raise self.error("too many joints", f"at most {JOINT_LIMIT}")
         if not (name := self.name()):
             raise MotionFileError(self.path, line, "joint without a name", "a name after ROOT or JOINT")
         return _Joint(name, parent, line)
@@ -172,14 +174,14 @@ class _Tokens:
         return MotionFileError(self.path, self.line, what, expected)
 
 
-def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:  # noqa: C901 - one branch per keyword
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[_Joint], int]:
     """Joints in the file's order and number of channels; leaves the lines after MOTION."""
     tokens = _Tokens(lines, path)
     if (word := tokens.next("HIERARCHY")).upper() != "HIERARCHY":
         raise tokens.error(f"file begins with {quoted(word)}", "HIERARCHY: is this a BVH file?")
     if (word := tokens.next("ROOT")).upper() != "ROOT":
         raise tokens.error(f"found {quoted(word)}", "ROOT")
-    joints = [tokens.joint(-1)]
+    joints = [tokens.joint(-1, 0)]
     open_joints, n_columns = [0], 0
     while open_joints:
         joint = joints[open_joints[-1]]
@@ -188,14 +190,10 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
         if keyword == "OFFSET":
             joint.offset = tokens.vector()
         elif keyword == "CHANNELS":
-            if joint.positions or joint.rotations:
-                raise tokens.error(f"joint {quoted(joint.name)} has CHANNELS twice", "one line of CHANNELS a joint")
             n_columns = _read_channels(tokens, joint, n_columns)
         elif keyword == "JOINT":
-            if len(joints) >= JOINT_LIMIT:
-                raise tokens.error("too many joints", f"at most {JOINT_LIMIT}")
-            open_joints.append(len(joints))
-            joints.append(tokens.joint(open_joints[-2]))
+            joints.append(tokens.joint(open_joints[-1], len(joints)))
+            open_joints.append(len(joints) - 1)
         elif keyword == "END":
             joint.tips.append(_read_end_site(tokens))
         elif word == "}":
@@ -213,6 +211,8 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> tuple[list[
 
 def _read_channels(tokens: _Tokens, joint: _Joint, column: int) -> int:
     """Record which columns drive which axes of a joint; returns the next free column."""
+    if joint.positions or joint.rotations:
+        raise tokens.error(f"joint {quoted(joint.name)} has CHANNELS twice", "one line of CHANNELS a joint")
     for _ in range(count(tokens.next("a number of channels"), 6, "number of channels", tokens.path, tokens.line)):
         word = tokens.next("a channel such as Xrotation")
         match = _CHANNEL.fullmatch(word)

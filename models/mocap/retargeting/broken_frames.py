@@ -99,7 +99,7 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
         if len(found):
             motion, tracks = _interpolate(motion, broken), ()
     shortened = rest != motion.n_frames - 1 and any(
-        track.ends_with_jump() for track in tracks or _tracks(motion, roles)
+        track.jumps(track.steps[::-1]) for track in tracks or _tracks(motion, roles)
     )
     if shortened:
         motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
@@ -119,7 +119,7 @@ def first_step_jumps(motion: SourceMotion, roles: Roles) -> bool:
 
     Of some 220 captures by other people, only those with a leading calibration pose have such a step.
     """
-    return motion.n_frames >= MIN_FRAME_COUNT and any(track.begins_with_jump() for track in _tracks(motion, roles))
+    return motion.n_frames >= MIN_FRAME_COUNT and any(track.jumps(track.steps) for track in _tracks(motion, roles))
 
 
 def used_joints(motion: SourceMotion, roles: Roles) -> list[int]:
@@ -141,25 +141,15 @@ class _Track:
     """
 
     def __init__(
-        self,
-        values: Array,
-        min_jump: float,
-        distance: Callable[[Array, Array], Array],
+        self, values: Array, min_jump: float, distance: Callable[[Array, Array], Array],
         deviation: Callable[[Array], Array],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.values, self.min_jump, self.distance, self.deviation = values, min_jump, distance, deviation
         self.steps = distance(values[:-1], values[1:])
         self.limits = _jump_limits(self.steps, 2)
 
-    def ends_with_jump(self) -> bool:
-        """Whether the last step is large compared with the usual ones and the previous one."""
-        return self._is_jump(self.steps[::-1])
-
-    def begins_with_jump(self) -> bool:
-        """Whether the first step is large compared with the usual ones and the next one."""
-        return self._is_jump(self.steps)
-
-    def _is_jump(self, steps: Array) -> bool:
+    def jumps(self, steps: Array) -> bool:
+        """Whether the first of steps is large compared with the usual ones and the next one."""
         return bool(np.any(steps[0] > np.maximum(np.maximum(self.limits, self.min_jump), _MIN_JUMP_RATIO * steps[1])))
 
     def gaps(self, length: int) -> npt.NDArray[np.intp]:

@@ -75,7 +75,8 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
         while (word := _shared_word(split, end)) is not None:
             if len(word) > 1 and any(matches(alias, word) for alias in sided | central):
                 break
-            split = [_drop_word(words, end) if len(words) > 1 and words[end] == word else words for words in split]
+            rest = slice(1, None) if end == 0 else slice(-1)
+            split = [words[rest] if len(words) > 1 and words[end] == word else words for words in split]
     # MakeHuman's __UpLeg_L is the link from the pelvis to UpLeg_L.
     return tuple(
         _parse(words, sided, _normalise(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
@@ -88,10 +89,6 @@ def _shared_word(split: Sequence[list[str]], end: int) -> str | None:
     word, n = counts.most_common(1)[0] if counts else ("", 0)
     has_meaning = word in _SIDES or (end == -1 and word in _HELPER_WORDS)
     return None if n < _MIN_SHARED_FRACTION * len(split) or has_meaning else word
-
-
-def _drop_word(words: list[str], end: int) -> list[str]:
-    return words[1:] if end == 0 else words[:-1]
 
 
 def _normalise(name: str) -> str:

@@ -61,13 +61,14 @@ def stated_roles(path: Path, motion: SourceMotion, people: Sequence[Sequence[int
 def _joints_of_roles(path: Path, stated: dict[str, object], motion: SourceMotion) -> dict[str, int]:
     """Joint of every role."""
     named: dict[str, int] = {}
+    listed = ", ".join(motion.joints[:40]) + (", …" if len(motion.joints) > 40 else "")
     for role, joint in stated.items():
         if role not in _ROLES:
             raise MotionFileError(path, 0, f"no role {quoted(role)}", f"one of {', '.join(_ROLES)}")
         indices = [k for k, name in enumerate(motion.joints) if name == joint]
         if not isinstance(joint, str) or len(indices) != 1:
             what = f"{len(indices) or 'no'} joint{'s' * (len(indices) > 1)} of {motion.path.name} called {joint!r}"
-            raise MotionFileError(path, 0, f"{role}: {what}", f"one of {_name_list(motion.joints)}")
+            raise MotionFileError(path, 0, f"{role}: {what}", f"one of {listed}")
         if other := [known for known, index in named.items() if index == indices[0]]:
             raise MotionFileError(path, 0, f"{joint} is both {other[0]} and {role}", "a joint for one role")
         named[role] = indices[0]
@@ -90,8 +91,3 @@ def _read_toml(path: Path) -> dict[str, object]:
         return tomllib.loads(read_text(path, _SIZE_LIMIT, "role file").decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise MotionFileError(path, 0, f"is no TOML ({error})", 'lines such as left_thigh = "NAME"') from None
-
-
-def _name_list(joints: tuple[str, ...]) -> str:
-    """The joints' names, or the first forty."""
-    return ", ".join(joints[:40]) + (", …" if len(joints) > 40 else "")

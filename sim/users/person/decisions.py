@@ -6,34 +6,10 @@ from numba import njit
 
 from controllers.work_array import work_array
 from geometry.arrays import Array
+from sim.users.person import person_state as at
 from sim.users.person.body import REFERENCE_GRIP
 from sim.users.person.motor_plan import aim, drive, may_decide, submove
-from sim.users.person.person_state import (
-    BELIEF,
-    CLOCK,
-    DECIDED,
-    DRIVEN_A,
-    DRIVEN_P,
-    DRIVEN_V,
-    ENGAGED_SHARE,
-    ENTRAINMENT,
-    FELT_FORCE,
-    GRIP,
-    HORIZON,
-    LAP,
-    LASTS,
-    LEARNED_PARTS,
-    LEARNING,
-    PERIOD,
-    REFRACTORY,
-    STIFFENING,
-    STIFFNESS_FACTOR,
-    TARGET,
-    TICKS,
-    WANTED_FORCE,
-    WISH_PERIOD,
-    PersonState,
-)
+from sim.users.person.person_state import PersonState
 from sim.users.person.wishes import ENGAGED, FORCE, PLACE, SWITCH, WIDTH, call_intent, wanted_motion
 from sim.users.person.wishes import GRIP as WISHED_GRIP
 
@@ -50,44 +26,44 @@ def act_on_wish(person: PersonState, switch: Array) -> None:
     n, m, V, rows = person.numbers, person.memory, person.vectors, person.wishes
     wanted, goal = work_array((3, 3)), work_array((3, 3))
     wanted[:], goal[:] = 0.0, 0.0
-    has_targets, is_user_defined = n[WISH_PERIOD] == 0.0, n[WISH_PERIOD] < 0.0
+    has_targets, is_user_defined = n[at.WISH_PERIOD] == 0.0, n[at.WISH_PERIOD] < 0.0
     if is_user_defined:
         if person.units[1] != 0:
-            call_intent(person.units[1], (m[TICKS] * n[PERIOD], V[BELIEF], V[FELT_FORCE], rows))
+            call_intent(person.units[1], (m[at.TICKS] * n[at.PERIOD], V[at.BELIEF], V[at.FELT_FORCE], rows))
         row = rows[0]
         wanted[0], wanted[1], goal[1] = row[PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3], rows[1, PLACE : PLACE + 3]
         for k in range(3):
-            goal[0, k] = wanted[0, k] + n[HORIZON] * wanted[1, k]
+            goal[0, k] = wanted[0, k] + n[at.HORIZON] * wanted[1, k]
         switch[0] = row[SWITCH]
     elif has_targets:
-        row = rows[min(int(m[TARGET]), rows.shape[0] - 1)]
+        row = rows[min(int(m[at.TARGET]), rows.shape[0] - 1)]
         wanted[0], goal[0] = row[PLACE : PLACE + 3], row[PLACE : PLACE + 3]
         switch[0] = 0.0
     else:
-        row = rows[wanted_motion(rows, n[WISH_PERIOD], m[CLOCK], wanted)]
-        _predict_wanted_motion(rows, n[WISH_PERIOD], m[CLOCK] + n[HORIZON], goal)
+        row = rows[wanted_motion(rows, n[at.WISH_PERIOD], m[at.CLOCK], wanted)]
+        _predict_wanted_motion(rows, n[at.WISH_PERIOD], m[at.CLOCK] + n[at.HORIZON], goal)
         switch[0] = row[SWITCH]
     engaged = row[ENGAGED] > 0.0
-    m[CLOCK] += n[PERIOD] * (
-        1.0 + _clock_speed_up(n[ENTRAINMENT], V[BELIEF], wanted) if engaged and n[WISH_PERIOD] > 0.0 else 1.0
+    m[at.CLOCK] += n[at.PERIOD] * (
+        1.0 + _clock_speed_up(n[at.ENTRAINMENT], V[at.BELIEF], wanted) if engaged and n[at.WISH_PERIOD] > 0.0 else 1.0
     )
-    grip = n[GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
-    activation_step = n[PERIOD] / ENGAGING_TIME
-    m[ENGAGED_SHARE] += activation_step * ((1.0 if engaged else 0.0) - m[ENGAGED_SHARE])
-    m[STIFFNESS_FACTOR] += activation_step * (
-        max(1.0 + n[STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[STIFFNESS_FACTOR]
+    grip = n[at.GRIP] if math.isnan(row[WISHED_GRIP]) else row[WISHED_GRIP]
+    activation_step = n[at.PERIOD] / ENGAGING_TIME
+    m[at.ENGAGED_SHARE] += activation_step * ((1.0 if engaged else 0.0) - m[at.ENGAGED_SHARE])
+    m[at.STIFFNESS_FACTOR] += activation_step * (
+        max(1.0 + n[at.STIFFENING] * (grip - REFERENCE_GRIP), 0.2) - m[at.STIFFNESS_FACTOR]
     )
     for k in range(3):
-        V[WANTED_FORCE, k] += activation_step * (row[FORCE + k] - V[WANTED_FORCE, k])
+        V[at.WANTED_FORCE, k] += activation_step * (row[FORCE + k] - V[at.WANTED_FORCE, k])
     if not engaged:
         _relax_arm(person)
         return
     if has_targets:
         if may_decide(person, True) and aim(person, goal, row[WIDTH]):
-            m[TARGET] += 1.0
+            m[at.TARGET] += 1.0
             switch[0] = 1.0
     elif may_decide(person, False):
-        submove(person, goal, n[HORIZON])
+        submove(person, goal, n[at.HORIZON])
     drive(person)
     _learn_force(person, wanted)
 
@@ -120,9 +96,9 @@ def _relax_arm(person: PersonState) -> None:
     """Be passive: the arm's rest position follows the believed position of the hand."""
     n, m, V = person.numbers, person.memory, person.vectors
     for k in range(3):
-        V[DRIVEN_P, k] += n[PERIOD] / YIELDING_TIME * (V[BELIEF, k] - V[DRIVEN_P, k])
-    V[DRIVEN_V], V[DRIVEN_A] = 0.0, 0.0
-    m[LASTS], m[DECIDED] = 0.0, m[TICKS] * n[PERIOD] - n[REFRACTORY]
+        V[at.DRIVEN_P, k] += n[at.PERIOD] / YIELDING_TIME * (V[at.BELIEF, k] - V[at.DRIVEN_P, k])
+    V[at.DRIVEN_V], V[at.DRIVEN_A] = 0.0, 0.0
+    m[at.LASTS], m[at.DECIDED] = 0.0, m[at.TICKS] * n[at.PERIOD] - n[at.REFRACTORY]
 
 
 @njit
@@ -135,19 +111,19 @@ def _learn_force(person: PersonState, wanted: Array) -> None:
     muscle activation.
     """
     n, m, V = person.numbers, person.memory, person.vectors
-    if n[LEARNING] == 0.0 or n[LAP] == 0.0:
+    if n[at.LEARNING] == 0.0 or n[at.LAP] == 0.0:
         return
-    part, activated_part = _lap_part(m[CLOCK] / n[LAP]), _lap_part((m[CLOCK] + ENGAGING_TIME) / n[LAP])
-    share = n[PERIOD] * LEARNED_PARTS / n[LAP]
+    part, activated_part = _lap_part(m[at.CLOCK] / n[at.LAP]), _lap_part((m[at.CLOCK] + ENGAGING_TIME) / n[at.LAP])
+    share = n[at.PERIOD] * at.LEARNED_PARTS / n[at.LAP]
     for k in range(3):
         pull = 0.0
         for j in range(3):
-            pull += person.stiffness[k, j] * (wanted[0, j] - V[BELIEF, j])
-        person.learned[part, k] += share * (n[LEARNING] * pull - (1.0 - RETENTION) * person.learned[part, k])
-        V[WANTED_FORCE, k] += n[PERIOD] / ENGAGING_TIME * person.learned[activated_part, k]
+            pull += person.stiffness[k, j] * (wanted[0, j] - V[at.BELIEF, j])
+        person.learned[part, k] += share * (n[at.LEARNING] * pull - (1.0 - RETENTION) * person.learned[part, k])
+        V[at.WANTED_FORCE, k] += n[at.PERIOD] / ENGAGING_TIME * person.learned[activated_part, k]
 
 
 @njit
 def _lap_part(laps: float) -> int:
     """Index of the part of a lap after a number of laps."""
-    return int(LEARNED_PARTS * (laps - math.floor(laps))) % LEARNED_PARTS
+    return int(at.LEARNED_PARTS * (laps - math.floor(laps))) % at.LEARNED_PARTS

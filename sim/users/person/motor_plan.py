@@ -6,26 +6,8 @@ from numba import njit
 
 from controllers.work_array import work_array
 from geometry.arrays import Array
-from sim.users.person.person_state import (
-    BEGUN,
-    BELIEF,
-    CALM,
-    CAUTION,
-    CORRECTION,
-    DECIDED,
-    DRIVEN_A,
-    DRIVEN_P,
-    DRIVEN_V,
-    INTENDED,
-    LASTS,
-    MOTOR_NOISE,
-    PERIOD,
-    REFRACTORY,
-    SEEN_TICKS,
-    TARGET,
-    TICKS,
-    PersonState,
-)
+from sim.users.person import person_state as at
+from sim.users.person.person_state import PersonState
 from sim.users.person.random_numbers import normal
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
 from sim.users.person.wishes import PLACE
@@ -43,22 +25,24 @@ def may_decide(person: PersonState, waits: bool) -> bool:
     A person who aims at a target waits (`waits`) until she has seen where the last submovement ends.
     """
     n, m, V = person.numbers, person.memory, person.vectors
-    now = m[TICKS] * n[PERIOD]
-    if now - m[DECIDED] < n[REFRACTORY]:
+    now = m[at.TICKS] * n[at.PERIOD]
+    if now - m[at.DECIDED] < n[at.REFRACTORY]:
         return False
-    elapsed = now - m[BEGUN]
+    elapsed = now - m[at.BEGUN]
     if waits:
-        return m[LASTS] == 0.0 or elapsed >= max(m[LASTS], SEEN_FRACTION * m[LASTS] + n[PERIOD] * n[SEEN_TICKS])
-    if m[LASTS] == 0.0 or elapsed >= m[LASTS]:
+        return m[at.LASTS] == 0.0 or elapsed >= max(
+            m[at.LASTS], SEEN_FRACTION * m[at.LASTS] + n[at.PERIOD] * n[at.SEEN_TICKS]
+        )
+    if m[at.LASTS] == 0.0 or elapsed >= m[at.LASTS]:
         return True
     believed = work_array((3, 3))
-    submovement(person.plans[1], m[LASTS], elapsed, believed)
+    submovement(person.plans[1], m[at.LASTS], elapsed, believed)
     squared_deviation = 0.0
     for k in range(3):
-        squared_deviation += (V[BELIEF, k] - believed[0, k]) ** 2
+        squared_deviation += (V[at.BELIEF, k] - believed[0, k]) ** 2
     if squared_deviation < MAX_DEVIATION * MAX_DEVIATION:
-        m[CALM] = now
-    return elapsed >= 0.5 * m[LASTS] or now - m[CALM] > REACTION_TIME
+        m[at.CALM] = now
+    return elapsed >= 0.5 * m[at.LASTS] or now - m[at.CALM] > REACTION_TIME
 
 
 @njit
@@ -67,19 +51,19 @@ def aim(person: PersonState, goal: Array, width: float) -> bool:
 
     A target is a strip across the line from the previous target, as in Fitts 1954; the first one is a ball.
     """
-    n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[TARGET])
+    n, V, rows, turn = person.numbers, person.vectors, person.wishes, int(person.memory[at.TARGET])
     distance, along, squared_spacing = 0.0, 0.0, 0.0
     for k in range(3):
-        distance += (goal[0, k] - V[BELIEF, k]) ** 2
+        distance += (goal[0, k] - V[at.BELIEF, k]) ** 2
         if 0 < turn < rows.shape[0]:
             spacing = rows[turn, PLACE + k] - rows[turn - 1, PLACE + k]
-            along += spacing * (goal[0, k] - V[BELIEF, k])
+            along += spacing * (goal[0, k] - V[at.BELIEF, k])
             squared_spacing += spacing * spacing
     distance = math.sqrt(distance) if squared_spacing == 0.0 else abs(along) / math.sqrt(squared_spacing)
     if distance < 0.5 * width:
         return True
-    overhead = n[PERIOD] * n[SEEN_TICKS]
-    seconds = aimed_seconds(2.0 * distance / width, n[CAUTION] * n[MOTOR_NOISE], overhead, MIN_SUBMOVEMENT_TIME)
+    overhead = n[at.PERIOD] * n[at.SEEN_TICKS]
+    seconds = aimed_seconds(2.0 * distance / width, n[at.CAUTION] * n[at.MOTOR_NOISE], overhead, MIN_SUBMOVEMENT_TIME)
     submove(person, goal, seconds)
     return False
 
@@ -96,34 +80,34 @@ def submove(person: PersonState, goal: Array, seconds: float) -> None:
     start, end, displacement, length = work_array((3, 3)), work_array((3, 3)), work_array(3), 0.0
     end[:] = goal
     for k in range(3):
-        displacement[k] = goal[0, k] - V[BELIEF, k]
+        displacement[k] = goal[0, k] - V[at.BELIEF, k]
         length += displacement[k] * displacement[k]
     length = math.sqrt(length)
-    start[0], start[1], start[2] = V[BELIEF], V[DRIVEN_V], V[DRIVEN_A]
+    start[0], start[1], start[2] = V[at.BELIEF], V[at.DRIVEN_V], V[at.DRIVEN_A]
     set_submovement(person.plans[1], start, goal, seconds)
-    scatter = n[MOTOR_NOISE] * length / seconds
+    scatter = n[at.MOTOR_NOISE] * length / seconds
     across = CROSS_SCATTER * scatter
     along = math.sqrt(scatter * scatter - across * across) * normal(person.rng)
     for k in range(3):
         unit = displacement[k] / length if length > 0.0 else 0.0
         error = along * unit + across * normal(person.rng)
-        end[0, k] += n[CORRECTION] * (V[DRIVEN_P, k] - V[BELIEF, k]) + error
-    start[0] = V[DRIVEN_P]
+        end[0, k] += n[at.CORRECTION] * (V[at.DRIVEN_P, k] - V[at.BELIEF, k]) + error
+    start[0] = V[at.DRIVEN_P]
     set_submovement(person.plans[0], start, end, seconds)
-    m[LASTS], m[BEGUN] = seconds, m[TICKS] * n[PERIOD]
-    m[DECIDED] = m[BEGUN]
+    m[at.LASTS], m[at.BEGUN] = seconds, m[at.TICKS] * n[at.PERIOD]
+    m[at.DECIDED] = m[at.BEGUN]
 
 
 @njit
 def drive(person: PersonState) -> None:
     """Follow the submovement in progress, and accumulate the intended displacement."""
     n, m, V = person.numbers, person.memory, person.vectors
-    if m[LASTS] == 0.0:
+    if m[at.LASTS] == 0.0:
         return
     state = work_array((3, 3))
-    elapsed = m[TICKS] * n[PERIOD] - m[BEGUN]
-    submovement(person.plans[1], m[LASTS], elapsed, state)
+    elapsed = m[at.TICKS] * n[at.PERIOD] - m[at.BEGUN]
+    submovement(person.plans[1], m[at.LASTS], elapsed, state)
     for k in range(3):
-        V[INTENDED, k] += n[PERIOD] * state[1, k]
-    submovement(person.plans[0], m[LASTS], elapsed, state)
-    V[DRIVEN_P], V[DRIVEN_V], V[DRIVEN_A] = state[0], state[1], state[2]
+        V[at.INTENDED, k] += n[at.PERIOD] * state[1, k]
+    submovement(person.plans[0], m[at.LASTS], elapsed, state)
+    V[at.DRIVEN_P], V[at.DRIVEN_V], V[at.DRIVEN_A] = state[0], state[1], state[2]

@@ -10,28 +10,11 @@ from numba import njit, typeof, types
 from controllers.lent import Lent
 from geometry.arrays import Array
 from sim.compilation.units import Unit
+from sim.users.person import person_state as at
 from sim.users.person.body import REFERENCE_GRIP
 from sim.users.person.decisions import act_on_wish
 from sim.users.person.muscles import move
-from sim.users.person.person_state import (
-    BELIEF,
-    CAPACITY,
-    DECIDED,
-    DRIVEN_P,
-    DRIVEN_V,
-    GRIP,
-    HAND_P,
-    HAND_V,
-    REFRACTORY,
-    SEEN,
-    SENSED,
-    SHOWN,
-    STARTED,
-    STIFFENING,
-    STIFFNESS_FACTOR,
-    PersonState,
-    no_person,
-)
+from sim.users.person.person_state import PersonState, no_person
 from sim.users.person.senses import sense
 
 
@@ -57,7 +40,7 @@ def person_step(
         Set to 1 while the switch is pressed, shape (1,).
     """
     if substep == 0:
-        if person.memory[STARTED] == 0.0:
+        if person.memory[at.STARTED] == 0.0:
             _begin(person, p, v)
         sense(person, p, force)
         act_on_wish(person, switch)
@@ -69,15 +52,15 @@ def _begin(person: PersonState, p: Array, v: Array) -> None:
     """Initialise the person with her hand at the stylus and moving with it, as her muscles drive it."""
     memory, vectors = person.memory, person.vectors
     vectors[:] = 0.0
-    for place in (HAND_P, DRIVEN_P, BELIEF, SHOWN):
+    for place in (at.HAND_P, at.DRIVEN_P, at.BELIEF, at.SHOWN):
         vectors[place] = p
-    vectors[HAND_V], vectors[DRIVEN_V] = v, v
+    vectors[at.HAND_V], vectors[at.DRIVEN_V] = v, v
     for row in range(person.past.shape[0]):
-        person.past[row, SENSED : SENSED + 3] = p
-        person.past[row, SEEN : SEEN + 3] = p
-    memory[STARTED], memory[CAPACITY] = 1.0, 1.0
-    memory[STIFFNESS_FACTOR] = 1.0 + person.numbers[STIFFENING] * (person.numbers[GRIP] - REFERENCE_GRIP)
-    memory[DECIDED] = -person.numbers[REFRACTORY]
+        person.past[row, at.SENSED : at.SENSED + 3] = p
+        person.past[row, at.SEEN : at.SEEN + 3] = p
+    memory[at.STARTED], memory[at.CAPACITY] = 1.0, 1.0
+    memory[at.STIFFNESS_FACTOR] = 1.0 + person.numbers[at.STIFFENING] * (person.numbers[at.GRIP] - REFERENCE_GRIP)
+    memory[at.DECIDED] = -person.numbers[at.REFRACTORY]
 
 
 def person_unit() -> Unit:

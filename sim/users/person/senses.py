@@ -10,49 +10,9 @@ from numba import njit
 
 from controllers.work_array import work_array
 from geometry.arrays import Array
+from sim.users.person import person_state as at
 from sim.users.person.eye import seen_place
-from sim.users.person.person_state import (
-    BELIEF,
-    BLUR,
-    DEVIATING,
-    DEVIATION,
-    DIRECTION_ERROR,
-    DIRECTION_ERROR_OFFSET,
-    DIRECTION_NOISE,
-    DRIFT,
-    DRIVEN_P,
-    DRIVEN_V,
-    FELT_FORCE,
-    FELT_FORCE_ERROR,
-    FELT_FORCE_NOISE,
-    FELT_NOISE,
-    FORCE_NOISE,
-    HAND_P,
-    HAND_V,
-    INTENDED,
-    INTENT,
-    LOOK_TICKS,
-    OFFSET,
-    PERIOD,
-    PRESSED,
-    REFLEX,
-    REFLEX_GAIN,
-    REFLEX_TICKS,
-    SEEN,
-    SEEN_NOISE,
-    SEEN_TICKS,
-    SENSED,
-    SHOWN,
-    TICKS,
-    TREMOR,
-    TREMOR_A,
-    TREMOR_B,
-    TREMOR_BEFORE,
-    TREMOR_GAIN,
-    UNSTEADY,
-    WISH_PERIOD,
-    PersonState,
-)
+from sim.users.person.person_state import PersonState
 from sim.users.person.random_numbers import normal
 
 DRIFT_TIME = 120.0  # [s] correlation time of the felt position's drift: 15 to 120 s (Wann & Ibrahim 1992, m)
@@ -68,45 +28,51 @@ UNSTEADY_TIME = 0.1  # [s] correlation time of force noise: mostly below 2 Hz (J
 def sense(person: PersonState, p: Array, force: Array) -> None:
     """Store what is felt and seen now, and update the estimate, reflexes and tremor from what arrives now."""
     n, m, V, past = person.numbers, person.memory, person.vectors, person.past
-    _advance_noise(person, DRIFT, n[FELT_NOISE], DRIFT_TIME)
+    _advance_noise(person, at.DRIFT, n[at.FELT_NOISE], DRIFT_TIME)
     advance_direction_error(person)
-    _advance_noise(person, BLUR, n[SEEN_NOISE], BLUR_TIME)
-    _advance_noise(person, UNSTEADY, n[FORCE_NOISE], UNSTEADY_TIME)
-    if n[WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
-        _advance_noise(person, FELT_FORCE_ERROR, n[FELT_FORCE_NOISE], UNSTEADY_TIME)
+    _advance_noise(person, at.BLUR, n[at.SEEN_NOISE], BLUR_TIME)
+    _advance_noise(person, at.UNSTEADY, n[at.FORCE_NOISE], UNSTEADY_TIME)
+    if n[at.WISH_PERIOD] < 0.0:  # only a user-defined intent uses the felt force
+        _advance_noise(person, at.FELT_FORCE_ERROR, n[at.FELT_FORCE_NOISE], UNSTEADY_TIME)
     size = past.shape[0]
-    tick = int(m[TICKS])
+    tick = int(m[at.TICKS])
     now = past[tick % size]
-    felt, seen = past[(tick - int(n[REFLEX_TICKS])) % size], past[(tick - int(n[SEEN_TICKS])) % size]
+    felt, seen = past[(tick - int(n[at.REFLEX_TICKS])) % size], past[(tick - int(n[at.SEEN_TICKS])) % size]
     _update_vision(person, p)
-    decay = math.exp(-n[PERIOD] / CALIBRATION_TIME)
+    decay = math.exp(-n[at.PERIOD] / CALIBRATION_TIME)
     for k in range(3):
-        now[SENSED + k], now[SEEN + k] = (
-            V[HAND_P, k] + V[DRIFT, k] + V[DIRECTION_ERROR_OFFSET, k],
-            V[SHOWN, k] + V[BLUR, k],
+        now[at.SENSED + k], now[at.SEEN + k] = (
+            V[at.HAND_P, k] + V[at.DRIFT, k] + V[at.DIRECTION_ERROR_OFFSET, k],
+            V[at.SHOWN, k] + V[at.BLUR, k],
         )
-        now[DEVIATION + k] = V[DRIVEN_P, k] - V[HAND_P, k]
-        now[DEVIATING + k] = V[DRIVEN_V, k] - V[HAND_V, k]
-        now[INTENT + k], now[PRESSED + k] = V[INTENDED, k], force[k]
-        V[OFFSET, k] = decay * V[OFFSET, k] + (1.0 - decay) * (seen[SEEN + k] - seen[SENSED + k])
-        V[BELIEF, k] = felt[SENSED + k] + V[OFFSET, k] + V[INTENDED, k] - felt[INTENT + k]
-        V[FELT_FORCE, k] = (1.0 + V[FELT_FORCE_ERROR, k]) * felt[PRESSED + k]
+        now[at.DEVIATION + k] = V[at.DRIVEN_P, k] - V[at.HAND_P, k]
+        now[at.DEVIATING + k] = V[at.DRIVEN_V, k] - V[at.HAND_V, k]
+        now[at.INTENT + k], now[at.PRESSED + k] = V[at.INTENDED, k], force[k]
+        V[at.OFFSET, k] = decay * V[at.OFFSET, k] + (1.0 - decay) * (seen[at.SEEN + k] - seen[at.SENSED + k])
+        V[at.BELIEF, k] = felt[at.SENSED + k] + V[at.OFFSET, k] + V[at.INTENDED, k] - felt[at.INTENT + k]
+        V[at.FELT_FORCE, k] = (1.0 + V[at.FELT_FORCE_ERROR, k]) * felt[at.PRESSED + k]
     for k in range(3):
-        V[REFLEX, k] = 0.0
+        V[at.REFLEX, k] = 0.0
         for j in range(3):
-            V[REFLEX, k] += person.stiffness[k, j] * felt[DEVIATION + j] + person.damping[k, j] * felt[DEVIATING + j]
-        V[REFLEX, k] *= n[REFLEX_GAIN]
-    tremor_gain = n[TREMOR_GAIN]
+            V[at.REFLEX, k] += (
+                person.stiffness[k, j] * felt[at.DEVIATION + j] + person.damping[k, j] * felt[at.DEVIATING + j]
+            )
+        V[at.REFLEX, k] *= n[at.REFLEX_GAIN]
+    tremor_gain = n[at.TREMOR_GAIN]
     for k in range(3):
-        tremor = n[TREMOR_A] * V[TREMOR, k] + n[TREMOR_B] * V[TREMOR_BEFORE, k] + tremor_gain * normal(person.rng)
-        V[TREMOR_BEFORE, k], V[TREMOR, k] = V[TREMOR, k], tremor
-    m[TICKS] += 1.0
+        tremor = (
+            n[at.TREMOR_A] * V[at.TREMOR, k]
+            + n[at.TREMOR_B] * V[at.TREMOR_BEFORE, k]
+            + tremor_gain * normal(person.rng)
+        )
+        V[at.TREMOR_BEFORE, k], V[at.TREMOR, k] = V[at.TREMOR, k], tremor
+    m[at.TICKS] += 1.0
 
 
 @njit
 def _advance_noise(person: PersonState, which: int, deviation: float, seconds: float) -> None:
     """Advance a noise vector, an Ornstein–Uhlenbeck process of given standard deviation and correlation time [s]."""
-    decay = math.exp(-person.numbers[PERIOD] / seconds)
+    decay = math.exp(-person.numbers[at.PERIOD] / seconds)
     noise_gain = deviation * math.sqrt(1.0 - decay * decay)
     for k in range(3):
         person.vectors[which, k] = decay * person.vectors[which, k] + noise_gain * normal(person.rng)
@@ -121,13 +87,13 @@ def advance_direction_error(person: PersonState) -> None:
     with a slowly varying small rotation δ [rad]: unseen movements miss by an angle that does not depend on their length
     (Gordon, Ghilardi & Ghez 1994 I).
     """
-    _advance_noise(person, DIRECTION_ERROR, person.numbers[DIRECTION_NOISE], ERROR_TIME)
-    V, v, angle = person.vectors, person.vectors[HAND_V], person.vectors[DIRECTION_ERROR]
-    period = person.numbers[PERIOD]
+    _advance_noise(person, at.DIRECTION_ERROR, person.numbers[at.DIRECTION_NOISE], ERROR_TIME)
+    V, v, angle = person.vectors, person.vectors[at.HAND_V], person.vectors[at.DIRECTION_ERROR]
+    period = person.numbers[at.PERIOD]
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        V[DIRECTION_ERROR_OFFSET, k] += period * (
-            angle[i] * v[j] - angle[j] * v[i] - V[DIRECTION_ERROR_OFFSET, k] / OFFSET_TIME
+        V[at.DIRECTION_ERROR_OFFSET, k] += period * (
+            angle[i] * v[j] - angle[j] * v[i] - V[at.DIRECTION_ERROR_OFFSET, k] / OFFSET_TIME
         )
 
 
@@ -136,15 +102,15 @@ def _update_vision(person: PersonState, p: Array) -> None:
     """Look at the figure or, if there is none, at the stylus (p)."""
     m, V, eye = person.memory, person.vectors, person.eye
     if eye.pose.shape[0] == 0:
-        V[SHOWN] = p
-    elif int(m[TICKS]) % int(person.numbers[LOOK_TICKS]) == 0:
+        V[at.SHOWN] = p
+    elif int(m[at.TICKS]) % int(person.numbers[at.LOOK_TICKS]) == 0:
         felt, squared_distance = work_array(3), 0.0
         for k in range(3):
-            felt[k] = V[HAND_P, k] + V[DRIFT, k] + V[DIRECTION_ERROR_OFFSET, k]
-        seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[SHOWN])
+            felt[k] = V[at.HAND_P, k] + V[at.DRIFT, k] + V[at.DIRECTION_ERROR_OFFSET, k]
+        seen_place(eye, felt, work_array(eye.inverses.shape[2]), V[at.SHOWN])
         for k in range(3):
-            squared_distance += (V[SHOWN, k] - felt[k]) ** 2
+            squared_distance += (V[at.SHOWN, k] - felt[k]) ** 2
         if (
-            squared_distance > (REJECTION_DISTANCE + 3.0 * person.numbers[FELT_NOISE]) ** 2
+            squared_distance > (REJECTION_DISTANCE + 3.0 * person.numbers[at.FELT_NOISE]) ** 2
         ):  # rejected: mistaken for another pose
-            V[SHOWN] = felt
+            V[at.SHOWN] = felt

@@ -13,7 +13,7 @@ from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.own_law import PythonLaw
 from controllers.fields.river import window
 from controllers.state import HandState
 from tests.derivatives import central_differences

@@ -5,12 +5,11 @@ import pytest
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from controllers.curves.orientation import curve_orientation
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
-from controllers.fields.orientation import Orientation
+from controllers.fields.orientation import Orientation, curve_orientation
 from controllers.state import HandState
 from tests.derivatives import extrapolated_differences
 

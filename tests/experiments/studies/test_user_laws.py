@@ -9,6 +9,7 @@ import pytest
 from experiments.cli import main
 from experiments.studies.user_laws.law import Law
 from experiments.studies.user_laws.report import STUDIES, TABLE, user_laws
+from experiments.studies.user_laws.tracing import natural_times
 
 PANELS = (1001, 1002, 1003)
 """Seeds of populations; numbers of people were chosen on those of seeds 1 to 6, 101, 201 and 202."""
@@ -53,3 +54,13 @@ def test_table_and_figures_are_not_replaced_without_overwrite(
     assert (tmp_path / TABLE).exists()
     assert main(command) == 2
     assert "overwrite" in capsys.readouterr().err
+
+
+def test_natural_pace_of_an_ellipse_is_harmonic() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 257)
+    ellipse = np.stack([0.04 * np.cos(angle), 0.02 * np.sin(angle)], axis=1)
+    # Points equally spaced in arc length, so that they carry no pace.
+    length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))))
+    even = np.interp(np.linspace(0.0, length[-1], 257), length, angle)
+    points = np.stack([0.04 * np.cos(even), 0.02 * np.sin(even)], axis=1)
+    np.testing.assert_allclose(natural_times(points, 2.0 * np.pi), even, atol=0.06)

@@ -21,6 +21,7 @@ from experiments.trials.execution.executors import Threads
 from experiments.trials.execution.where import Where
 from experiments.trials.trial.run_trial import Row, Task
 from experiments.tuning import search as searching
+from experiments.tuning import tune as tuning_from_python
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, storage_of, violation_of
 from experiments.tuning.tune import TunedSimulation, _study_name
@@ -70,8 +71,16 @@ def test_refuted_candidates_are_never_simulated(tmp_path: Path) -> None:
 def test_resumed_search_equals_an_uninterrupted_one(tmp_path: Path, sampler: str) -> None:
     whole = searched(tuning(), tmp_path / "whole", sampler)
     searched(tuning(candidates=4), tmp_path / "stopped", sampler)
-    _leave_an_unfinished_trial(tmp_path / "stopped", sampler)
+    _leave_an_unfinished_trial(tmp_path / "stopped")
     assert searched(tuning(), tmp_path / "stopped", sampler) == whole
+
+
+@pytest.mark.usefixtures("certificates")
+def test_search_by_changed_code_keeps_no_candidate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = searched(tuning(candidates=2), tmp_path)
+    monkeypatch.setattr(searching, "code_hash", lambda module: "changed")
+    (tmp_path / "tune.sqlite").unlink()
+    assert searched(tuning(candidates=1), tmp_path) == before[:1]  # proposed and tried again
 
 
 @pytest.mark.slow
@@ -140,10 +149,12 @@ def test_pruned_candidate_has_no_objectives() -> None:
     assert (found.state, found.objectives) == ("given up", None)
 
 
-def _leave_an_unfinished_trial(folder: Path, sampler: str) -> None:
+def _leave_an_unfinished_trial(folder: Path) -> None:
     import optuna
 
-    optuna.load_study(study_name=f"identity-{sampler}", storage=storage_of(folder / "journal")).ask()
+    storage = storage_of(folder / "journal")
+    (name,) = optuna.get_all_study_names(storage)
+    optuna.load_study(study_name=name, storage=storage).ask()
 
 
 @pytest.mark.parametrize(
@@ -227,7 +238,7 @@ def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     assert "defaults" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-def test_name_of_a_search_depends_on_all_that_its_cost_depends_on() -> None:
+def test_name_of_a_search_depends_on_all_that_its_cost_depends_on(monkeypatch: pytest.MonkeyPatch) -> None:
     curve, scale = hvf.circle(lap=2.0), 1.0
 
     def name(
@@ -254,6 +265,8 @@ def test_name_of_a_search_depends_on_all_that_its_cost_depends_on() -> None:
     assert names[:3] == [name(), name(hvf.User(pushes=[hvf.Push(0.1, 0.2, 1.0)])), name(intent)]
     scale = 2.0
     assert name(intent) != names[2]
+    monkeypatch.setattr(tuning_from_python, "code_hash", lambda module: "changed")
+    assert name() != names[0]
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 import pytest
 
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.own_law import PythonLaw
 from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips

@@ -7,33 +7,10 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from sim.errors import SimError
 from sim.users.hand.actions import Grab, Push
-from sim.users.intents import (
-    Bend,
-    ChangeOver,
-    CutCorner,
-    Exaggerate,
-    GetLost,
-    Lead,
-    Own,
-    Press,
-    Relax,
-    Resist,
-    Trace,
-)
+from sim.users.intents import Bend, ChangeOver, CutCorner, Exaggerate, GetLost, Lead, Own, Press, Relax, Resist, Trace
 from sim.users.participant import Participant
-from sim.users.person.pace import natural_times
 from sim.users.person.submovement import aimed_seconds, set_submovement, submovement
-from sim.users.person.wishes import (
-    ENGAGED,
-    FORCE,
-    GRIP,
-    PLACE,
-    SWITCH,
-    Wishes,
-    following,
-    targets,
-    wanted_motion,
-)
+from sim.users.person.wishes import ENGAGED, FORCE, GRIP, PLACE, SWITCH, Wishes, following, targets, wanted_motion
 
 CIRCLE = Trajectory.circle(0.04, 4.0)
 INTENTS = [
@@ -66,16 +43,6 @@ def test_submovement_count_minimises_the_total_time() -> None:
     for x, scatter in ((2.0, 0.01), (30.0, 0.02), (300.0, 0.02), (300.0, 0.08)):
         best = min(range(1, 9), key=lambda n: total(n, x, scatter))
         assert aimed_seconds(x, scatter, 0.2, 0.16) == pytest.approx(total(best, x, scatter) / best - 0.2)
-
-
-def test_natural_pace_of_an_ellipse_is_harmonic() -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 257)
-    ellipse = np.stack([0.04 * np.cos(angle), 0.02 * np.sin(angle)], axis=1)
-    # Points equally spaced in arc length, so that they carry no pace.
-    length = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(ellipse, axis=0), axis=1))))
-    even = np.interp(np.linspace(0.0, length[-1], 257), length, angle)
-    points = np.stack([0.04 * np.cos(even), 0.02 * np.sin(even)], axis=1)
-    np.testing.assert_allclose(natural_times(points, 2.0 * np.pi), even, atol=0.06)
 
 
 def test_wanted_motion_interpolates_its_rows_and_rests_at_its_end() -> None:

@@ -19,9 +19,14 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.river import River
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_field import given_curves
-from experiments.certify.certified_rivers import certified_bundle, certify_rivers, held_common, meetings
+from experiments.certify.certified_rivers import (
+    certified_bundle,
+    certify_rivers,
+    held_common,
+    meetings,
+    simulated_course,
+)
 from experiments.certify.certify import certified_rivers
-from experiments.certify.crossing_simulation import simulated_course
 from experiments.config.options import run_config
 from experiments.setups.modes.rivers import default_choice, law_of
 from experiments.studies.switching_trials import straight_pair, trials

@@ -13,7 +13,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.own.compiled_law import CompiledLaw
-from controllers.fields.own.python_law import PythonLaw
+from controllers.fields.own.own_law import PythonLaw
 from controllers.fields.river import River, window
 from controllers.state import HandState
 from tests.controllers.fields.field_probes import force_of, largest_jump

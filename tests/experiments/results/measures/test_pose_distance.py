@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.results.measures.pose_distance import geodesic_distance, seen_distance
+from experiments.trials.trial.measures import geodesic_distance, seen_distance
 from models.humanoid.skeleton import N_TANGENT, figure_model, rest_pose
 
 

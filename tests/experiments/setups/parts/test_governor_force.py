@@ -9,6 +9,7 @@ from experiments.config.options import run_config
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.governor import Governed, animation_along
+from experiments.setups.parts.lap import DEFAULT_LAP
 from experiments.setups.wiring import wire
 from experiments.studies.rate_trials import DRAG, LedBackflip
 from models.mocap.library import embedded
@@ -62,8 +63,8 @@ def test_governor_speeds_follow_the_animation_of_the_run():
     maps, governor = session.parts.maps, session.field.governor
     # At the clips' own pace, not at that of the lap or of the friction-compensated curve.
     pace, shares = maps.curve.length / maps.lap_seconds, np.linspace(0.0, 1.0, len(governor.speeds))
-    assert maps.lap_seconds != pytest.approx(config.map.around.lap, rel=0.1)
-    assert session.curve.duration < 0.95 * config.map.around.lap
+    assert maps.lap_seconds != pytest.approx(DEFAULT_LAP, rel=0.1)
+    assert session.curve.duration < 0.95 * DEFAULT_LAP
     (flight,) = clip_ballistics(embedded("backflip")).flights
     flying = governor.speeds[:, 0] > 0.0
     np.testing.assert_allclose(governor.speeds[flying], np.tile(pace * np.array(flight.admissible), (flying.sum(), 1)),
@@ -85,9 +86,7 @@ def test_governor_speeds_follow_the_animation_of_the_run():
 def test_animation_without_flights_needs_no_governor():
     config = run_config(clips=("cheer", "angry"))
     session = wire(config)
-    clip = animation_along(
-        session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, config.map.around.lap)
-    )
+    clip = animation_along(session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, DEFAULT_LAP))
     assert not clip_ballistics(clip).flights
 
 
