@@ -31,8 +31,10 @@ def lap_remarks(given: Map, filled: Map, seconds: float) -> tuple[str, ...]:
     if isinstance(given, Led) or isinstance(filled, Led) or given.around.lap is not None:
         return ()
     lap = filled.around.lap
-    short = f", so this run of {seconds:g} s ends within the first: --seconds changes that" if seconds < lap else ""
-    remark = f"a lap takes {lap:.1f} s, which suits these clips best{short}; --lap changes it"
+    changes = "; --lap changes it"
+    if seconds < lap:
+        changes = f", and this run of {seconds:g} s ends before it does; --seconds and --lap change that"
+    remark = f"a lap takes {lap:.1f} s, which suits these clips best{changes}"
     return () if lap == DEFAULT_LAP else (remark,)
 
 
