@@ -31,11 +31,12 @@ def lap_remarks(given: Map, filled: Map, seconds: float) -> tuple[str, ...]:
     if isinstance(given, Led) or isinstance(filled, Led) or given.around.lap is not None:
         return ()
     lap = filled.around.lap
+    if lap is None or lap == DEFAULT_LAP:
+        return ()
     changes = "; --lap changes it"
     if seconds < lap:
         changes = f", and this run of {seconds:g} s ends before it does; --seconds and --lap change that"
-    remark = f"a lap takes {lap:.1f} s, which suits these clips best{changes}"
-    return () if lap == DEFAULT_LAP else (remark,)
+    return (f"a lap takes {lap:.1f} s, which suits these clips best{changes}",)
 
 
 def circle_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -> Trajectory:
