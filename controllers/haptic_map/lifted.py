@@ -12,13 +12,13 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap, arms_of_others
 from controllers.haptic_map.lifted_kernel import clip_weights, lifted_map, packed_lifted, with_legs_of
-from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, PlacedClip, checked_angles, closing_gap
+from controllers.haptic_map.lifting.frames import PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.legs.stance_hold import fresh_footing
-from controllers.motion.loops import checked_clip
+from controllers.motion.loops import MAX_CLOSURE_GAP, checked_clip
 from geometry.arrays import Array
 
 

@@ -17,8 +17,9 @@ from controllers.motion.channels import normalise
 from geometry.arrays import Array
 from geometry.quaternions import about_axis, product, with_continuous_signs
 
-# [m], [rad] a lap that ends nearer to its start has no drift
+# [m], [rad] a lap that ends nearer to its start has no drift, unless its ends differ by that alone: a closed lap
 _MAX_STILL_LENGTH, _MAX_STILL_ANGLE = 0.02, np.deg2rad(2.0)
+MAX_CLOSURE_GAP = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
 # least vertical component of the pelvis axis at which turns about the vertical are counted
 _MIN_UPRIGHT_COMPONENT = 0.3
 _SEAM_FRACTION = 0.2  # fraction of the lap at each end that may change when an open clip is closed
@@ -163,13 +164,22 @@ def drift_of(poses: Array) -> Array:
     first, last = poses[0], poses[-1]
     net, turns = turn_of(poses)
     step = last[:2] - rotate_in_plane(np.array(net), first[:2])
-    if abs(net) < _MAX_STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _MAX_STILL_LENGTH:
+    near = abs(net) < _MAX_STILL_ANGLE and float(np.hypot(*(last[:2] - first[:2]))) < _MAX_STILL_LENGTH
+    if near and (turns or not _differs_over_the_floor_alone(first, last, net)):
         return np.array([0.0, 0.0, 2.0 * np.pi * turns])
     if abs(net) < 1.0:
         turns = 0  # the exponential of a twist of whole turns has no translation, so these stay in the remainder
     angle = net + 2.0 * np.pi * turns
     columns, _ = plane_exponential(np.array([[1.0, 0.0, angle], [0.0, 1.0, angle]]))
     return np.append(np.linalg.solve(columns.T, step), angle)
+
+
+def _differs_over_the_floor_alone(first: Array, last: Array, turn: float) -> bool:
+    """Whether a pose (nq,) is another one, moved over the floor and turned by an angle [rad]."""
+    before, after = first[3:].reshape(-1, 4).copy(), last[3:].reshape(-1, 4)
+    before[0] = product(about_axis(2, np.array(turn)), before[0])
+    gaps = np.minimum(np.abs(after - before).max(axis=1), np.abs(after + before).max(axis=1))
+    return bool(max(abs(last[2] - first[2]), gaps.max()) < MAX_CLOSURE_GAP)
 
 
 def periodic_remainder(poses: Array, s: Array, drift: Array) -> Array:

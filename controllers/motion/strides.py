@@ -85,17 +85,17 @@ def _best_repeat_count(durations: Array, lap: float) -> int:
     return int(ways[np.maximum(-faster, _FASTER_COST * faster).max(axis=1).argmin()])
 
 
-def natural_lap(loops: Sequence[Loop]) -> float:
+def natural_lap(loops: Sequence[Loop], apart: bool = False) -> float:
     """Duration of a lap [s] in which the first loop plays at its own pace, and the others as nearly as possible.
 
     Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from 3 to 6 s or
     the duration of the longest loop; of all within 2 % of the best, the shortest is chosen. A lap of several short
-    cycles gives the hand more time to change the blend.
+    cycles gives the hand more time to change the blend. `apart` is as in `fit_to_lap`.
     """
     first = loops[0]
     stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
     fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
     highest = int(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)) / stride + _REPEAT_TOLERANCE)
     laps = stride * np.arange(fewest, max(fewest, highest) + 1)
-    worst = np.array([max(abs(np.log(loop.duration / lap)) for loop in fit_to_lap(loops, float(lap))) for lap in laps])
+    worst = np.array([max(abs(np.log(one.duration / lap)) for one in fit_to_lap(loops, lap, apart)) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

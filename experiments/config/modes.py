@@ -172,7 +172,7 @@ class StretchyTube:
     tube_damping: float | None = at_least(0.0, default=None, unit="N s/m", most=MAX_DAMPING)
     rubber_from: Literal["curve", "stylus"] = "curve"
     rubber_tube: float = at_least(1e-4, default=0.008, unit="m")
-    bump: float = above(0.0, default=0.5, unit="s")
+    bump: float | None = above(0.0, default=None, unit="s")
     walls: JointWalls | None = None
 
 
@@ -193,8 +193,8 @@ class Stretch(StretchyTube):
         stylus at that moment.
     rubber_tube : float
         Radius of the tube that can be held and pushed [m].
-    bump : float
-        Half width of what a bend changes [s], at most half a lap.
+    bump : float, optional
+        Half width of what a bend changes [s], at most half a lap; by default an eighth of a lap, but at least 0.5 s.
     walls
         What is added, if anything.
     """

@@ -34,8 +34,9 @@ class User:
         one that leads a figure. A person also exaggerates here and calms there, cuts a corner, changes over to another
         motion, resists, or gets lost and comes back.
     pushes : tuple of Push
-        By default, for a hand that pushes: outwards and inwards once a lap from the second lap on; on rivers over into
-        another one; on the rivers of a lifted map at the best transition, and three laps later back.
+        By default, for a hand that pushes: outwards and inwards once a lap from the second lap on, or sooner if the
+        run ends by then; on rivers over into another one; on the rivers of a lifted map at the best transition, and
+        three laps later back.
     turns : tuple of Turn
         By default, for a hand that turns: one lap to the left and right, one down and up, one over to either side.
     grabs : tuple of Grab

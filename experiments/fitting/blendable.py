@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
-from controllers.motion.strides import natural_lap
+from controllers.motion.strides import fit_to_lap, natural_lap
 from geometry import quaternions
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.motion.clip import Clip
@@ -96,10 +96,14 @@ def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
 def best_lap(clips: Sequence[Clip], timing: int, in_rounds: bool) -> float:
     """Duration of a lap [s] in which the clip of index `timing` plays at its own pace, and the others nearly so.
 
-    `in_rounds` says whether the clips may be played in rounds of several laps; long laps are then divided.
+    If there is no such lap with travelling clips in step, they need not be, as on the maps. `in_rounds` says whether
+    the clips may be played in rounds of several laps; long laps are then divided.
     """
     loops = closed_loops(clips)
-    lap = natural_lap([loops[timing], *loops[:timing], *loops[timing + 1 :]])
+    loops = [loops[timing], *loops[:timing], *loops[timing + 1 :]]
+    lap = natural_lap(loops)
+    if not keeps_pace(clips, fit_to_lap(loops, lap), lap):
+        lap = natural_lap(loops, apart=True)
     return round(lap / np.ceil(lap / _MAX_ROUND_LAP) if in_rounds else lap, 6)
 
 

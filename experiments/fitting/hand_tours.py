@@ -23,7 +23,6 @@ from sim.reference.reference import make_reference, map_poses, reference_along
 _DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
 _PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
 _PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
-_TIMES = np.arange(round((TRIAL_SECONDS + 1.0) * FPS)) / FPS
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
 _DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and the transition; [s] to the next river
 _RIVERS_DURATION = _DWELL_TIME * len(_ORDER)
@@ -40,20 +39,21 @@ def poses_about_circle(haptic_map: Cylindrical | Composite, r: Array | float, an
     return map_poses(haptic_map, stylus_path(np.stack(points, axis=-1)))
 
 
-def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
+def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bool, seconds: float) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
     so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
-    (`Follow.parallel`) its angular speed does not change.
+    (`Follow.parallel`) its angular speed does not change. The tour takes `seconds`, and goes on for one more.
     """
-    turn, pushed = 2.0 * np.pi * _TIMES / TRIAL_SECONDS, _DOMAIN_FRACTION * _push_profile(_TIMES)
+    times = _times(seconds)
+    turn, pushed = 2.0 * np.pi * times / seconds, _DOMAIN_FRACTION * _push_profile(times)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = domain(haptic_map).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
     middle = 0.5 * (low[0] + high[0])
     pace = middle / (middle + pushed * (high[0] - low[0]))
-    elapsed = _TIMES if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
+    elapsed = times if parallel else np.concatenate([[0.0], np.cumsum(pace[:-1])]) / FPS
     return Clip(poses_about_circle(haptic_map, r, 2.0 * np.pi / lap * elapsed, z), FPS, "blend")
 
 
@@ -63,12 +63,17 @@ def tour_along_curve(haptic_map: Lifted, curve: Trajectory, keeps_pace: bool) ->
     If the field does not keep the pace off the curve (`Follow.parallel`), a push does not change the hand's speed, so
     its angular speed is lower the further out it is.
     """
-    pushed = _PUSH_OFFSET * _push_profile(np.maximum(_TIMES - _PUSH_INTERVAL, 0.0))
-    elapsed = _TIMES if keeps_pace else _slowed_phase(curve, pushed)
+    times = _times(TRIAL_SECONDS)
+    pushed = _PUSH_OFFSET * _push_profile(np.maximum(times - _PUSH_INTERVAL, 0.0))
+    elapsed = times if keeps_pace else _slowed_phase(curve, pushed)
     phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
     points = curve.point(curve.start + phases)
     points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
     return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "pushed")
+
+
+def _times(seconds: float) -> Array:
+    return np.arange(round((seconds + 1.0) * FPS)) / FPS
 
 
 def _push_profile(times: Array) -> Array:

@@ -35,9 +35,10 @@ Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
 def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
-    """The trial in which the physical figure follows a map about a circle for 20 s."""
+    """The trial in which the physical figure follows a map about a circle for 20 s, or a lap if that is longer."""
+    seconds = max(TRIAL_SECONDS, lap)
     made_of = (haptic_map.compiled().params, np.array([lap, parallel, *domain(haptic_map).ravel()]))
-    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), TRIAL_SECONDS, made_of)
+    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel, seconds), seconds, made_of)
 
 
 def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ MAX_FOOT_SKATE = 0.02
 MAX_PENETRATION, MAX_JOINT_EXCESS = 0.01, np.deg2rad(5.0)
 
 TRIAL_SECONDS, FPS = 20.0, 120.0
-"""Duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
+"""Least duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
 
 
 class Motion(NamedTuple):

@@ -70,7 +70,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         raise SimError("nobody is at a terminal to arm the device; expected --arm, or a terminal")
     if ignored := ignored_options(config):
         console.print(f"Ignored on a device: {', '.join(ignored)}.", highlight=False)
-    config = resolved(config)
+    given, config = config, resolved(config)
     _check_permit(config, options, console)
     content = content_of(config.device)
     known = linkage_from(content)
@@ -80,7 +80,7 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
     if options.name == EMULATED:
         delay_in_steps(scene, emulated_linkage.delay)
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
-    session = _compile_session(config, options, console)
+    session = _compile_session(given, options, console)  # which remarks on what was left open
     job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene, known)
     make = MakeServo(
         served(config), options.name, _gate(config, options), known.offset, calibration_from(content),

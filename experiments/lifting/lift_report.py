@@ -11,6 +11,7 @@ from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.maps import MAP_SUFFIX
 from experiments.files.given_path import given_path
+from experiments.files.made_folder import made_folder
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable
 from experiments.fitting.verdict import MAX_JOINT_EXCESS, MAX_PENETRATION
@@ -210,7 +211,7 @@ def lift_into(
         raise SimError(f"{out}: a map is written into a {MAP_SUFFIX} file; expected a name that ends so")
     if out.exists() and not overwrite:
         raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
-    report = report_lift(lift_clips(clips, room, tuple(map(str, cyclic)), seed, raw), seed)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    save_map(report.lifted.haptic_map, out)
+    with made_folder(out.parent):
+        report = report_lift(lift_clips(clips, room, tuple(map(str, cyclic)), seed, raw), seed)
+        save_map(report.lifted.haptic_map, out)
     return report

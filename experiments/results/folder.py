@@ -15,6 +15,7 @@ from controllers.errors import ParameterError
 from experiments.config.part import from_dict
 from experiments.config.run_config import RunConfig
 from experiments.files.curve_files import CURVE_FILE
+from experiments.files.made_folder import made_folder
 from models.mocap.motion.clip import Clip
 from models.world.scene import SceneConfig
 from sim.errors import SimError
@@ -27,11 +28,9 @@ _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, D
 
 
 def check_folder(out: Path, overwrite: bool) -> None:
-    """Refuse a folder that cannot be written, is in use, or holds a run that may not be replaced."""
-    if out.exists():
-        with locked_folder(out):
-            pass
-    check_holds(out, overwrite)
+    """Refuse a folder that cannot be written or created, is in use, or holds a run that may not be replaced."""
+    with made_folder(out), locked_folder(out):
+        check_holds(out, overwrite)
 
 
 def check_holds(out: Path, overwrite: bool) -> None:

@@ -89,7 +89,7 @@ def wire(
         raise ParameterError(LEAD_WITHOUT_FIGURE)  # with a real device, the walker is led even without a figure
     if device is None:
         device = device_of(config, world, config.seconds)
-    maps = maps_of(config, world.body, clips).with_remarks(lap_remarks(given.map, config.map))
+    maps = maps_of(config, world.body, clips).with_remarks(lap_remarks(given.map, config.map, config.seconds))
     return wire_parts(world, maps, lambda maps: parts_of(config, maps), ready, device)
 
 

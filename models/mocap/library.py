@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NamedTuple, TypeAlias
 
 from models.errors import ModelError
@@ -167,7 +168,8 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
     Raises
     ------
     ModelError
-        If its name has none of the `ends`, or it exists and is not to be overwritten.
+        If its name has none of the `ends`, its folder cannot be written into, or it exists and is not to be
+        overwritten.
     """
     if target.suffix.lower() not in ends:
         formats = " and ".join(_WRITABLE_FORMATS[end] for end in ends)
@@ -176,6 +178,10 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
         )
     if target.exists() and not overwrite:
         raise ModelError(f"{target} exists and is left as it is; expected a new name, or --overwrite")
+    try:
+        TemporaryFile(dir=target.parent).close()
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror}; expected a writable path") from None
 
 
 @contextmanager

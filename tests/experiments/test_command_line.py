@@ -74,18 +74,33 @@ def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.C
     assert "takes 1 to 4 clips, got 0" in stderr
 
 
-def test_unwritable_output_path_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("command", [["lift", "walk", "--out"], ["prepare", "missing.bvh"]])
+def test_unwritable_target_is_refused_before_anything_is_computed(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("experiments.lifting.lift_report.lift_clips", lambda *_: pytest.fail("clips were lifted"))
     (tmp_path / "file").write_text("no folder")
-    stderr = refused(["lift", "walk", "--out", str(tmp_path / "file" / "map.npz")], capsys)
-    assert stderr.startswith(f"hvf: {tmp_path / 'file'}")
+    end = ".npz" if command[0] == "lift" else ".bvh"
+    stderr = refused([*command, str(tmp_path / "file" / f"target{end}")], capsys)
+    assert str(tmp_path / "file") in stderr
+    assert "missing" not in stderr
     assert "Errno" not in stderr
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
 def test_output_on_a_file_system_without_size_is_not_reported_as_full(capsys: pytest.CaptureFixture[str]) -> None:
+    """It is refused before anything is compiled, about which the error output would say a line."""
     stderr = refused(["run", "--figure", "none", "--seconds", "1", "--out", "/proc/nowhere"], capsys)
     assert stderr.startswith("hvf: /proc/nowhere: ")
     assert "free" not in stderr
+
+
+def test_folder_made_in_order_to_see_whether_it_can_be_written_does_not_remain(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "run"
+    refused(["run", "--figure", "none", "--map", "missing.npz", "--out", str(out)], capsys)
+    assert not (tmp_path / "new").exists()
 
 
 def test_folder_with_a_run_is_kept_unchanged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.lifted import Lifted
-from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, closing_gap
+from controllers.haptic_map.lifting.frames import closing_gap
 from controllers.haptic_map.lifting.room import Room
+from controllers.motion.loops import MAX_CLOSURE_GAP
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
 from models.errors import ModelError

@@ -59,10 +59,10 @@ def test_figure_stands_while_a_bent_walk_is_performed(map_file: Path, tmp_path: 
     # The performance begins at full speed in the middle of a step.
     assert summary.figure.fell_at is None
     assert summary.performance is not None
-    # 0.10 to 0.15 over three kernels and nine seeds; a figure carried by the residual has 1.
+    # 0.11 with both kernels of OpenBLAS and two seeds; a figure carried by the residual has 1.
     assert summary.performance.figure.residual_force_rms < 0.4
-    # 1.0 to 1.6 cm, or 3.3 if lifting ends in another optimum, depending on the kernels of OpenBLAS.
-    assert summary.performance.figure.root_error_max_cm < 5.0
+    # 0.38 to 0.39 cm
+    assert summary.performance.figure.root_error_max_cm < 2.0
 
 
 @pytest.mark.usefixtures("without_page")

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from controllers.haptic_map.lifting.arrangement import N_ANGLES, Task, evaluate_sites
+from controllers.haptic_map.lifting.arrangement_energy import N_ANGLES, Task, evaluate_sites
 from controllers.haptic_map.lifting.transitions import Transition
 from geometry.arrays import Array
 
@@ -71,12 +71,12 @@ class ArrangementMeasure(NamedTuple):
 
 def measure(task: Task, controls: Array) -> ArrangementMeasure:
     """Measure an arrangement of control points (N_ROWS, n, 2)."""
-    q, dq, ddq = evaluate_sites(controls)
-    n = q.shape[1]
+    sites = evaluate_sites(controls)
+    q, n = sites[0], sites.shape[2]
     angle = 2.0 * np.pi * np.arange(N_ANGLES) / N_ANGLES
     r, z, c, s = q[..., 0], q[..., 1], np.cos(angle)[:, None], np.sin(angle)[:, None]
     points = np.stack([r * c, r * s, z], axis=-1)
-    v, u = (np.moveaxis(part, 0, -1) for part in task.hand_motion(q, dq, ddq))
+    v, u = (np.moveaxis(part, 0, -1) for part in task.hand_motion(sites))
     speed, pull = np.linalg.norm(v, axis=-1), np.linalg.norm(u, axis=-1)
     bend = np.linalg.norm(np.cross(v, u), axis=-1) / speed**3
     curves = [

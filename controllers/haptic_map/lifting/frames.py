@@ -24,7 +24,6 @@ from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from geometry.quaternions import about_axis, product
 
-MAX_CLOSURE_GAP = 1e-6  # [m], or components of quaternions (half of the angle in rad): largest gap of a closed clip
 LEAST_GAP = 0.05  # [rad] least gap that an open clip must leave in the lap
 WIDEST_STEP = 0.5 * np.pi  # [rad] largest angle between two frames
 

@@ -12,14 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.errors import ParameterError
-from controllers.haptic_map.lifting.arrangement import N_ANGLES, Task, arrange, sites_of
+from controllers.haptic_map.lifting.arrangement import arrange
+from controllers.haptic_map.lifting.arrangement_energy import N_ANGLES, Task, sites_of
 from controllers.haptic_map.lifting.common_lap import N_SAMPLES, Phase, common_lap
 from controllers.haptic_map.lifting.curve_measures import ArrangementMeasure, measure
-from controllers.haptic_map.lifting.frames import MAX_CLOSURE_GAP, closing_gap
+from controllers.haptic_map.lifting.frames import closing_gap
 from controllers.haptic_map.lifting.layouts import lattice
 from controllers.haptic_map.lifting.motion_features import Features, Motion, features
 from controllers.haptic_map.lifting.room import Room
 from controllers.haptic_map.lifting.transitions import Comparison, Transition, compare, find_transitions, same_motions
+from controllers.motion.loops import MAX_CLOSURE_GAP
 from geometry.arrays import Array, Mask
 
 _MIN_FRAMES = 4  # frames that a cubic spline needs

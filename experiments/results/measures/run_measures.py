@@ -36,6 +36,7 @@ SETTLING_TIME = 1.0  # [s] after the start or after a push, until a relaxed hand
 MIN_PUSH_FORCE = 1e-3  # [N] force above which the hand counts as pushing
 STANDSTILL_RADIUS = 1e-3  # [m] of motion within which the stylus counts as standing still
 SOLES_RATE = 100.0  # [Hz] at which the animation's soles are sampled
+_ROUNDING = 1e-6  # [s] by which times of ticks differ from those of what the hand is to do then
 _PACE_TIME = 0.1  # [s] over which the hand's pace is averaged
 _TICK_CHANNELS = ("t", "p", "nearest", "distance", "phase", "river", "user", "tank", "tank_scale")
 _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "ground", "flight", "down", "saturated")
@@ -161,7 +162,7 @@ class PathMeasure:
         self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING_TIME) & ~pushed & along])
         self._add_phase(t, ticks["phase"])
         self._add_position(t, ticks["p"])
-        handled = np.any([(start <= t) & (t <= end) for start, end in self._handled], axis=0)
+        handled = np.any([(start - _ROUNDING <= t) & (t <= end + _ROUNDING) for start, end in self._handled], axis=0)
         self._add_pushes(ticks, size, at_work & ~handled)
         return pushed
 

@@ -32,9 +32,10 @@ from models.mocap.motion.spans import spans
 from sim.users.hand.actions import Grab
 from sim.world.world import FigureKind
 
-# [s] time of the default hand to get to a place: a quarter of a lap at the curve's own pace, as the figure follows
-# it.
-REACH_TIME = 1.8
+# Time of the default hand to get to a place, a quarter of a lap away: at least that of a lap of 4 s [s], and a share of
+# the lap, in which its greatest speed is 1.04 times the curve's own, as the figure follows it.
+REACH_TIME, _REACH_SHARE = 1.8, 0.45
+_MIN_BUMP, _BUMP_SHARE = 0.5, 0.125  # default half width of a bend: that of a lap of 4 s [s], and a share of the lap
 # Distance from the curve, in tube radii, at which the hand aims to press; the seeking spring pulls it in by a third.
 PRESS_RATIO = 2.2
 EASE_TIME = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
@@ -43,7 +44,10 @@ _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, ro
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
     """Parts of a run in the mode "stretch"."""
-    return _make_parts(config, mode, maps, maps.curve, _Performance(None, np.inf), ())
+    until = max((grab.end for grab in _resolve_user(config, mode, maps).grabs), default=0.0)
+    late = f"the curve is bent until {until:.1f} s; give --seconds more than that"
+    remarks = (late,) if config.seconds <= until else ()
+    return _make_parts(config, mode, maps, maps.curve, _Performance(None, np.inf), remarks)
 
 
 def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: ClipMapParts) -> Parts:
@@ -52,7 +56,7 @@ def stretch_then_follow_parts(config: RunConfig, mode: StretchThenFollow, maps: 
     user = _resolve_user(config, mode, maps)
     until = hands.edited_until(user.grabs)
     carried = max((float(np.linalg.norm(grab.carry)) for grab in user.grabs), default=0.0)
-    power = river_power(mode.damping, fastest(course) + _MAX_BUMP_SLOPE * carried / mode.bump)
+    power = river_power(mode.damping, fastest(course) + _MAX_BUMP_SLOPE * carried / _bump(mode, course))
     late = f"the curve is bent until {until:.1f} s and performed then; give --seconds more than that"
     remarks = (late,) if config.seconds <= until else ()
     performance = _Performance(
@@ -70,6 +74,10 @@ class _Performance(NamedTuple):
     power: float = 0.0
 
 
+def _bump(mode: StretchyTube, course: Trajectory) -> float:
+    return max(_MIN_BUMP, _BUMP_SHARE * course.duration) if mode.bump is None else mode.bump
+
+
 def _resolve_user(config: RunConfig, mode: StretchyTube, maps: ClipMapParts) -> User:
     if isinstance(config.device, Replay):
         return config.user
@@ -84,19 +92,20 @@ def _make_parts(
     config: RunConfig, mode: StretchyTube, maps: ClipMapParts, course: Trajectory,
     performance: _Performance, remarks: tuple[str, ...],
 ) -> Parts:  # fmt: skip
-    if mode.bump > 0.5 * course.duration:
+    bump = _bump(mode, course)
+    if bump > 0.5 * course.duration:
         # The course is timed to lead the Phantom at the lap's pace, and is a little shorter.
         lap = maps.curve.duration
-        least, most = np.ceil(21.0 * mode.bump * lap / course.duration) / 10.0, np.floor(49.0 * course.duration) / 100.0
+        least, most = np.ceil(21.0 * bump * lap / course.duration) / 10.0, np.floor(49.0 * course.duration) / 100.0
         raise ParameterError(
-            f"a lap of {lap:g} s is too short for a bend of --bump {mode.bump:g} s to either side; expected --lap "
+            f"a lap of {lap:g} s is too short for a bend of --bump {bump:g} s to either side; expected --lap "
             f"{least:g} or more, or --bump {most:g} or less"
         )
     user = _resolve_user(config, mode, maps)
     seek, damping = tube_gains(mode)
     tubes = StretchyTubes(
         course, seek, mode.rubber, damping,
-        epsilon=mode.rubber_tube, width=mode.bump, until=performance.until, then=performance.law, ease=EASE_TIME,
+        epsilon=mode.rubber_tube, width=bump, until=performance.until, then=performance.law, ease=EASE_TIME,
         hold=mode.rubber_from,
     )  # fmt: skip
     pushed = hands.first_pushed_lap(maps.curve, user.grabs)
@@ -116,7 +125,7 @@ def _make_parts(
         )  # fmt: skip
 
     return Parts(
-        config=replace(config, user=user), maps=maps, field=tubes,
+        config=replace(config, mode=replace(mode, bump=bump), user=user), maps=maps, field=tubes,
         program=with_walls(tubes.program(), mode.walls, maps), course=course,
         user=hands.user_hand(user, maps.curve, config.seconds, config.seed),
         tank=tank_for(power, springs, maps.reach, ForceLimiter(config.clock.servo_period)), notes=notes,
@@ -155,7 +164,7 @@ def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ..
 
 
 def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tuple[Grab, ...]:
-    """Grabs of the default hand, in thirteen seconds.
+    """Grabs of the default hand, in thirteen seconds on a lap of 4 s.
 
     The hand pulls the curve outwards, pulls it up, undoes and redoes that by a short and a long click, and pushes the
     curve inwards from outside.
@@ -174,7 +183,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     centre = curve.point(np.linspace(curve.start, curve.end, 64, endpoint=not curve.periodic)).mean(axis=0)
     away = (third - centre) / np.linalg.norm(third - centre)
     outwards = 0.02 * share * (first - centre) / np.linalg.norm(first - centre)
-    still, pressed = np.zeros(3), PRESS_RATIO * epsilon
+    still, pressed, reach = np.zeros(3), PRESS_RATIO * epsilon, max(REACH_TIME, _REACH_SHARE * curve.duration)
     actions = (
         (outwards, 1.3, 0.4, first),
         (np.array([0.0, 0.0, 0.015 * share]), 1.3, 0.4, second),
@@ -186,7 +195,7 @@ def stretch_grabs(curve: Trajectory, epsilon: float, share: float = 1.0) -> tupl
     for carry, duration, hold, place in actions:
         start = grabs[-1].end + hands.PAUSE_TIME if grabs else hands.PAUSE_TIME
         reached = None if place is None else _as_tuple(place)
-        grabs.append(Grab(start, _as_tuple(carry), duration, hold, reached, REACH_TIME))
+        grabs.append(Grab(start, _as_tuple(carry), duration, hold, reached, reach))
     return tuple(grabs)
 
 

@@ -33,6 +33,7 @@ _REFERENCE_SPEED = 0.0749  # [m/s] of the default rivers, at which these and `RI
 _MAX_SCALED_SPEED = 0.2  # [m/s] in faster rivers a push is the same as at this speed: a harder one throws the hand out
 # Power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind.
 _SLOW_FORCE_EXPONENT = 0.2
+_PEAK_SHARE = 0.25  # of the lap: where `lap_pushes` and `lap_turns` have their first peaks
 _START_SPREAD = 1e-3  # [m] standard deviation of the start position
 # [m/s] least speed that turns an offset into a phase; largest phase as a share of a lap
 _MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
@@ -94,13 +95,15 @@ def resolved_user(
     """
     grabs, turns, lap = user.grabs or grabs, user.turns, curve.duration
     if user.does == "turn" and not turns:
-        laps = range(1, max(2, int(seconds / lap)))
-        turns = tuple(turn for k in laps for turn in lap_turns(k * lap, lap, k - 1))
+        begin = _first_acting(lap, lap, seconds)
+        laps = range(max(1, int((seconds - begin) / lap)))
+        turns = tuple(turn for k in laps for turn in lap_turns(begin + k * lap, lap, k))
     user_pushes = user.pushes
     if user.does == "push" and not user_pushes and pushes is not None:
         user_pushes = pushes
     elif user.does == "push" and not user_pushes:
         begin = first_pushed_lap(curve, grabs)
+        begin = begin if grabs else _first_acting(begin, lap, seconds)
         laps = range(max(1, int((seconds - begin) / lap)))
         user_pushes = tuple(push for k in laps for push in lap_pushes(begin + k * lap, lap))
     return User(does=user.does, pushes=user_pushes, turns=turns, grabs=grabs, person=user.person)
@@ -158,6 +161,11 @@ def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:
     return curve.duration + (edited_until(grabs) if grabs else 0.0)
 
 
+def _first_acting(begin: float, lap: float, seconds: float) -> float:
+    """Time at which pushes or turns begin [s]: before `begin` if the run would end before the first one's peak."""
+    return begin if begin + _PEAK_SHARE * lap < seconds else max(0.0, seconds - lap)
+
+
 def handling_spans(user: User) -> tuple[tuple[float, float], ...]:
     """Intervals of time [s] in which a hand grabs or traces."""
     if user.traces:
@@ -173,10 +181,16 @@ def turning_remark(user: User, oriented: bool) -> tuple[str, ...]:
 
 
 def late_remark(user: User, seconds: float) -> tuple[str, ...]:
-    """Remark, if all pushes lie after the end of a run of this duration [s]."""
-    first = min((push.at for push in user.pushes), default=0.0)
-    late = f"the first push is at {first:g} s, after the run's end; give --seconds more than that"
-    return (late,) if first >= seconds else ()
+    """Remarks, if the first push or turn has its peak after the end of a run of this duration [s]."""
+    peaks = {
+        name: min((each.at + 0.5 * each.seconds for each in actions), default=0.0)
+        for name, actions in (("push", user.pushes), ("turn", user.turns))
+    }
+    return tuple(
+        f"the first {name} has its peak at {peak:.4g} s, after the run's end; give --seconds more than that"
+        for name, peak in peaks.items()
+        if peak >= seconds
+    )
 
 
 def edited_until(grabs: tuple[Grab, ...]) -> float:

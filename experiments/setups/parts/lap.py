@@ -23,12 +23,20 @@ def with_lap(part: Map) -> Map:
     return replace(part, around=replace(part.around, lap=_lap_of(part)))
 
 
-def lap_remarks(given: Map, filled: Map) -> tuple[str, ...]:
-    """Remark on a lap that was chosen by the clips of a map; none if it was given, or is the default."""
+def lap_remarks(given: Map, filled: Map, seconds: float) -> tuple[str, ...]:
+    """Remark on a lap that was chosen by the clips of a map, in a run of this duration [s].
+
+    There is none if the lap was given, or is the default.
+    """
     if isinstance(given, Led) or isinstance(filled, Led) or given.around.lap is not None:
         return ()
     lap = filled.around.lap
-    return () if lap == DEFAULT_LAP else (f"a lap takes {lap:.1f} s, which suits these clips best; --lap changes it",)
+    if lap is None or lap == DEFAULT_LAP:
+        return ()
+    changes = "; --lap changes it"
+    if seconds < lap:
+        changes = f", and this run of {seconds:g} s ends before it does; --seconds and --lap change that"
+    return (f"a lap takes {lap:.1f} s, which suits these clips best{changes}",)
 
 
 def circle_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -> Trajectory:

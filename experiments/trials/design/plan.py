@@ -18,8 +18,10 @@ from experiments.config.options import run_config
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.lap import with_lap
 from experiments.trials.design.design import Condition, DesignTrial, conditions, design_trials
 from experiments.trials.design.study_config import StudyConfig, StudyError, Words
+from models.errors import ModelError
 from models.mocap.library import embedded_names
 from sim.compilation.sources import reached_code
 from sim.users.person.person import Person
@@ -123,8 +125,10 @@ def _base_config(study: StudyConfig, person: Person, condition: Condition) -> Ru
     if words.get("mode") != "lead":  # in LEADING the hand does nothing but lead
         words.setdefault("user", study.users.does)
     try:
-        return run_config(**words)
-    except ParameterError as error:
+        config = run_config(**words)
+        # Now and not in each trial: where motion files decide on the lap, they are read.
+        return replace(config, map=with_lap(config.map))
+    except (ParameterError, ModelError) as error:
         level_text = ", ".join(f"{factor} = {level}" for factor, level in condition.levels.items())
         raise StudyError(f"study {study.name!r}, condition {level_text}: {to_keywords(str(error))}") from None
     except TypeError as error:

@@ -21,6 +21,13 @@ def _mean_heading(poses):
     return np.angle(np.sum((w + 1j * z) ** 2))
 
 
+def _nearly_in_place(open_by=0.0):
+    """A clip that moves by 14 mm, and whose height then differs."""
+    poses = swinging(2, travel=0.014)
+    poses[-1, 2] += open_by
+    return poses
+
+
 def _somersault(frames=60):
     poses = swinging(1, frames)
     pitch = np.linspace(0.0, -2.0 * np.pi, frames + 1)
@@ -33,11 +40,13 @@ def _somersault(frames=60):
     [
         (swinging(1), [0.0, 0.0, 0.0]),
         (swinging(2, travel=1.3), [1.3, 0.0, 0.0]),
+        (_nearly_in_place(), [0.014, 0.0, 0.0]),
+        (_nearly_in_place(open_by=1e-3), [0.0, 0.0, 0.0]),
         (swinging(3, turns=1.0), [0.0, 0.0, 2 * np.pi]),
         (swinging(4, turns=-2.0), [0.0, 0.0, -4 * np.pi]),
         (_somersault(), [0.0, 0.0, 0.0]),
     ],
-    ids=["in place", "walk", "spin", "double spin", "somersault"],
+    ids=["in place", "walk", "closed but for 14 mm", "open", "spin", "double spin", "somersault"],
 )
 def test_drift_is_displacement_and_turn_per_lap(poses, drift):
     loop = _loop(poses)

@@ -12,7 +12,7 @@ from experiments.config.options import run_config
 from experiments.config.run_config import load_config
 from experiments.files.json_text import json_text
 from experiments.results.folder import config_of
-from experiments.setups.parts.lap import DEFAULT_LAP
+from experiments.setups.parts.defaults import resolved
 from sim.recording.recording import Recording
 
 
@@ -38,9 +38,7 @@ def test_non_finite_numbers_become_null() -> None:
 def test_infinite_configuration_values_are_strict_json_in_all_run_files(tmp_path) -> None:
     words = ["--figure", "none", "--walls", "--joint-speed", "inf", "--tube", "inf", "--seconds", "0.1"]
     assert main(["run", *words, "--out", str(tmp_path)]) == 0
-    config = run_config(
-        figure="none", walls=True, joint_speed=np.inf, tube=np.inf, seconds=0.1, flow="curve", lap=DEFAULT_LAP
-    )
+    config = resolved(run_config(figure="none", walls=True, joint_speed=np.inf, tube=np.inf, seconds=0.1, flow="curve"))
     text = (tmp_path / "config.json").read_text(encoding="utf-8")
     assert strictly(text)["mode"]["tube"] == "Infinity"  # pyright: ignore
     assert load_config(tmp_path / "config.json") == config

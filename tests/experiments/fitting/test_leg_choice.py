@@ -38,7 +38,7 @@ def set_verdicts(
         trials.append((haptic_map.legs_of, haptic_map.share))
         return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
 
-    monkeypatch.setattr(leg_choice, "tour_of_domain", lambda haptic_map, lap, parallel: haptic_map)
+    monkeypatch.setattr(leg_choice, "tour_of_domain", lambda haptic_map, *_: haptic_map)
     monkeypatch.setattr(Trial, "verdict", verdict)
     monkeypatch.setattr(Trial, "is_sound", lambda trial: trial.show().legs_of in fit)
     return trials
@@ -104,7 +104,7 @@ def test_trial_hand_covers_the_whole_map(
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
     monkeypatch.setattr(hand_tours, "map_poses", record_points)
-    tour_of_domain(maps[1], LAP, parallel)
+    tour_of_domain(maps[1], LAP, parallel, 20.0)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
     assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
@@ -113,6 +113,13 @@ def test_trial_hand_covers_the_whole_map(
     pace = np.diff(angle) * 120.0 * LAP / (2.0 * np.pi)
     assert (pace.min(), pace.max()) == pytest.approx(paces, abs=0.01)
     assert np.median(pace) == pytest.approx(1.0, abs=0.05) or np.mean(pace) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("lap", "seconds"), [(LAP, 20.0), (30.0, 30.0)])
+def test_trial_takes_a_whole_lap(lap: float, seconds: float, maps: list[Cylindrical]) -> None:
+    trial = trial_of(maps[1], lap, False)
+    assert trial.seconds == seconds
+    assert trial.show().duration > seconds
 
 
 @pytest.mark.slow

@@ -39,6 +39,8 @@ from experiments.files.json_text import json_text
 from experiments.hardware.arming_checks import DEFAULT_HAND_PUSH, check_device, ignored_options, verified
 from experiments.hardware.calibrate import Fixture, still_readings
 from experiments.setups.parts.defaults import resolved
+from models.mocap.library import embedded
+from models.mocap.readers.own_bvh import write_bvh
 from models.world.scene import SceneConfig
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
@@ -310,9 +312,10 @@ def test_state_diagram_in_docs_matches_transition_table() -> None:
 
 @pytest.mark.processes
 def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsys) -> None:
-    out = tmp_path / "run"
+    out, clip = tmp_path / "run", tmp_path / "leap.bvh"
+    write_bvh(embedded("jump"), clip)
     arguments = ["hardware", "run", "--arm", "--seconds", "4", "--late", "1", "--servo-period", "0.004",
-                 "--physics-step", "0.00025", "--out", str(out)]  # fmt: skip
+                 "--physics-step", "0.00025", "--clips", str(clip), "--out", str(out)]  # fmt: skip
     for _ in range(3):  # retried, for a busy machine misses deadlines
         code = main([*arguments, "--overwrite"])
         stdout = capsys.readouterr().out
@@ -324,6 +327,7 @@ def test_run_on_emulated_device_is_recorded_and_summarised(tmp_path: Path, capsy
     assert summary["ticks"] > 500
     assert summary["active"] > 1.0
     assert summary["recorded"] == summary["ticks"]
+    assert any(remark.startswith("a lap takes 4.8 s") for remark in summary["remarks"])
     with Recording(out / "run.h5") as recording:
         assert recording.summary is not None
         assert recording.channel("ticks", "distance")[-100:].max() < 5e-3

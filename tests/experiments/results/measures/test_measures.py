@@ -163,6 +163,11 @@ def test_handled_time_counts_neither_as_push_nor_as_left_alone(tmp_path: Path) -
     assert f"up to {whole.animation.pushed_deg:.2f}° a joint." in " ".join(handled.lines())
 
 
+def test_tick_that_rounding_takes_out_of_a_grab_is_no_push(tmp_path: Path) -> None:
+    first = summary_of(tmp_path / "whole.h5").path.pushes[0].start
+    assert summary_of(tmp_path / "run.h5", handled=((first + 1e-9, 2.6),)).path.pushes == ()
+
+
 def test_tracing_hand_is_reported(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5", handled=((0.0, np.inf),))
     with Recording(tmp_path / "run.h5") as recording:

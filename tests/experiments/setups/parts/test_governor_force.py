@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from experiments.config.options import run_config
 from experiments.flights.ballistics import clip_ballistics
@@ -86,7 +85,7 @@ def test_governor_speeds_follow_the_animation_of_the_run():
 def test_animation_without_flights_needs_no_governor():
     config = run_config(clips=("cheer", "angry"))
     session = wire(config)
-    clip = animation_along(session.parts.maps.haptic_map, Trajectory.circle(config.map.around.radius, DEFAULT_LAP))
+    clip = animation_along(session.parts.maps.haptic_map, session.curve)
     assert not clip_ballistics(clip).flights
 
 

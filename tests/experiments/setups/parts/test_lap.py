@@ -60,6 +60,8 @@ def test_given_lap_and_laps_of_embedded_clips_stay(slow_jump: str) -> None:
 def test_chosen_lap_is_said_and_a_given_one_is_not(slow_jump: str) -> None:
     config = run_config(figure="none", map="composite", clips=(slow_jump, "walk", "walk"), seconds=1.0)
     session = wire(config)
-    assert any(remark.startswith("a lap takes 7.2 s") for remark in session.remarks)
+    assert any(remark.startswith("a lap takes 7.2 s, which") for remark in session.remarks)
+    assert any("this run of 1 s ends before it does" in remark for remark in session.remarks)
+    assert not any("ends before it does" in remark for remark in wire(replace(config, seconds=8.0)).remarks)
     assert session.config == resolved(config)
     assert not any("a lap takes" in remark for remark in wire(replace(config, map=resolved(config).map)).remarks)

@@ -2,19 +2,36 @@
 
 import pytest
 
+from controllers.curves.trajectory import Trajectory
 from experiments.config.run_config import User
-from experiments.setups.parts.hands import late_remark
-from sim.users.hand.actions import Push
+from experiments.setups.parts.hands import late_remark, resolved_user
+from sim.users.hand.actions import Push, Turn
 
 
 @pytest.mark.parametrize(
     ("at", "remarks"),
     [
         ((), ()),
-        ((4.9, 7.0), ()),
-        ((7.0, 5.0), ("the first push is at 5 s, after the run's end; give --seconds more than that",)),
+        ((4.7, 7.0), ()),
+        ((7.0, 5.0), ("the first push has its peak at 5.25 s, after the run's end; give --seconds more than that",)),
+        ((4.9,), ("the first push has its peak at 5.15 s, after the run's end; give --seconds more than that",)),
     ],
 )
-def test_pushes_that_all_lie_past_the_end_are_reported(at: tuple[float, ...], remarks: tuple[str, ...]) -> None:
+def test_pushes_whose_peaks_all_lie_past_the_end_are_reported(at: tuple[float, ...], remarks: tuple[str, ...]) -> None:
     user = User(does="push", pushes=tuple(Push(start, 0.5, 2.0) for start in at))
     assert late_remark(user, 5.0) == remarks
+
+
+@pytest.mark.parametrize("lap", [4.0, 15.0, 17.0, 24.0, 60.0])
+@pytest.mark.parametrize("does", ["push", "turn"])
+def test_a_hand_acts_within_the_run_however_long_the_lap(does: str, lap: float) -> None:
+    user = resolved_user(User(does=does), Trajectory.circle(0.05, lap), 20.0)  # pyright: ignore[reportArgumentType]
+    assert late_remark(user, 20.0) == ()
+    first = (user.pushes + user.turns)[0].at
+    assert first == pytest.approx(lap + (0.1 * lap if does == "push" else 0.0)) or lap > 15.0
+
+
+def test_a_turn_past_the_end_is_reported() -> None:
+    turns = (Turn(4.0, 2.0, 0.7, (0.0, 0.0, 1.0)),)
+    assert "the first turn has its peak at 5 s" in late_remark(User(does="turn", turns=turns), 5.0)[0]
+    assert late_remark(User(does="turn", turns=turns), 6.0) == ()

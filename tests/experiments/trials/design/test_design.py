@@ -7,10 +7,15 @@ from pathlib import Path
 import pytest
 
 from controllers.errors import ParameterError
+from experiments.config.maps import Circle, Cylindrical
+from experiments.setups.parts.clips import load_clips
 from experiments.trials.design.design import balanced_latin_square, conditions, design_trials
 from experiments.trials.design.plan import file_digest, plan_trials
 from experiments.trials.design.study_config import StudyError, parse_study, read_toml
 from experiments.trials.study import Study
+from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
+from models.mocap.readers.own_bvh import write_bvh
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[4] / "examples/studies").glob("*.toml"))
 
@@ -99,6 +104,22 @@ def test_contradictory_design_is_refused_in_one_line(values: dict[str, object], 
     with pytest.raises(StudyError, match=message) as raised:
         plan_trials(study(**values))
     assert "\n" not in str(raised.value)
+
+
+def test_lap_that_motion_files_choose_is_in_the_plan_and_found_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_bvh(embedded("jump"), tmp_path / "leap.bvh")
+    loads: list[tuple[str, ...]] = []
+
+    def load(names: tuple[str, ...], raw: bool) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+        loads.append(names)
+        return load_clips(names, raw)
+
+    monkeypatch.setattr("experiments.setups.parts.clips.load_clips", load)
+    trials = plan_trials(study(run={"clips": [str(tmp_path / "leap.bvh")]}, repetitions=3))
+    assert len(trials) > len(loads) == 2  # one for each condition
+    assert {trial.config.map for trial in trials} == {Cylindrical(clips=loads[0], around=Circle(lap=4.8))}
 
 
 @pytest.mark.parametrize(
