@@ -91,9 +91,14 @@ class AnimationMap(ClipMap):
     share_at: ClassVar[int]
 
     def __init__(
-        self, clips: Sequence[tuple[Array, float]], numbers: Sequence[float] | Array, second_group: Sequence[int],
-        limbs: Sequence[Limb], lap: float | None = None, apart: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        clips: Sequence[tuple[Array, float]],
+        numbers: Sequence[float] | Array,
+        second_group: Sequence[int],
+        limbs: Sequence[Limb],
+        lap: float | None = None,
+        apart: bool = False,
+    ) -> None:
         poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
         if len({clip.shape[1] for clip in poses}) != 1:
             raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")

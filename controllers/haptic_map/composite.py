@@ -66,10 +66,16 @@ class Composite(AnimationMap):
     share_at = _SHARE
 
     def __init__(
-        self, lower: tuple[Array, float], red: tuple[Array, float], blue: tuple[Array, float],
-        upper_joints: Sequence[int], r_range: tuple[float, float], limbs: Sequence[Limb] = (), lap: float | None = None,
+        self,
+        lower: tuple[Array, float],
+        red: tuple[Array, float],
+        blue: tuple[Array, float],
+        upper_joints: Sequence[int],
+        r_range: tuple[float, float],
+        limbs: Sequence[Limb] = (),
+        lap: float | None = None,
         apart: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")

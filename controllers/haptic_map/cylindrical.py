@@ -143,10 +143,16 @@ class Cylindrical(AnimationMap):
     share_at = _SHARE
 
     def __init__(
-        self, clips: Sequence[tuple[Array, float]], r_range: tuple[float, float], z_range: tuple[float, float],
-        limbs: Sequence[Limb] = (), corrections: Array | None = None, lap: float | None = None,
-        upper: Sequence[int] = (), legs_of: int = 0,
-    ) -> None:  # fmt: skip
+        self,
+        clips: Sequence[tuple[Array, float]],
+        r_range: tuple[float, float],
+        z_range: tuple[float, float],
+        limbs: Sequence[Limb] = (),
+        corrections: Array | None = None,
+        lap: float | None = None,
+        upper: Sequence[int] = (),
+        legs_of: int = 0,
+    ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
                 f"the cylindrical map blends {_CLIPS} clips, got {len(clips)}; give one more than once"

@@ -85,10 +85,16 @@ class Lifted(ClipMap):
     map_kernel = staticmethod(lifted_map)
 
     def __init__(
-        self, clips: Sequence[tuple[Array, float]], closed: Sequence[bool], angles: Sequence[Array], sites: Array,
-        limbs: Sequence[Limb] = (), names: Sequence[str] = (), margin: float = 4e-3,
+        self,
+        clips: Sequence[tuple[Array, float]],
+        closed: Sequence[bool],
+        angles: Sequence[Array],
+        sites: Array,
+        limbs: Sequence[Limb] = (),
+        names: Sequence[str] = (),
+        margin: float = 4e-3,
         transitions: Sequence[MapTransition] | Array = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         m = len(clips)
         names = tuple(names) or tuple(str(i) for i in range(m))
         if m < 1 or {len(closed), len(angles), len(names)} != {m} or len(set(names)) != m:
@@ -208,9 +214,12 @@ class Lifted(ClipMap):
             stored_clips(arrays),
             [_checked_flag(f"closed/{name}", float(stored_array(arrays, f"closed/{name}", (1,))[0])) for name in names],
             [stored_array(arrays, f"angles/{name}", (None,)) for name in names],
-            stored_array(arrays, "sites", (None, None, 2)), stored_limbs(arrays), names,
-            float(stored_array(arrays, "margin", (1,))[0]), stored_array(arrays, "transitions", (None, 5)),
-        )  # fmt: skip
+            stored_array(arrays, "sites", (None, None, 2)),
+            stored_limbs(arrays),
+            names,
+            float(stored_array(arrays, "margin", (1,))[0]),
+            stored_array(arrays, "transitions", (None, 5)),
+        )
 
 
 def _checked_flag(name: str, value: float) -> bool:

@@ -126,9 +126,15 @@ class RiverClips(AnimationMap):
     map_kernel = staticmethod(river_clips_map)
 
     def __init__(
-        self, curves: Sequence[Trajectory], clips: Sequence[tuple[Array, float]], tube: float,
-        limbs: Sequence[Limb] = (), lap: float | None = None, apart: bool = False, laps: int = 1,
-    ) -> None:  # fmt: skip
+        self,
+        curves: Sequence[Trajectory],
+        clips: Sequence[tuple[Array, float]],
+        tube: float,
+        limbs: Sequence[Limb] = (),
+        lap: float | None = None,
+        apart: bool = False,
+        laps: int = 1,
+    ) -> None:
         if len(clips) != len(curves) or not curves:
             raise ParameterError(
                 f"a map of rivers needs a clip for each; got {len(clips)} clips and {len(curves)} rivers"

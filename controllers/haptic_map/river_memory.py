@@ -26,9 +26,17 @@ from geometry.rotations import multiply
 # LEAD: lead of the clip over the hand at that moment. CLIP_PHASE: phase that is shown. TRANSITION: change in progress
 # (−1: none). GATE_PHASE: its gate. LAST_SEARCH_PHASE: phase shown when gates were last searched.
 (
-    ACTIVE_RIVER, HAND_PHASE, HELD, TIMING_RIVER, ENTRY_PHASE, LEAD, CLIP_PHASE, TRANSITION, GATE_PHASE,
+    ACTIVE_RIVER,
+    HAND_PHASE,
+    HELD,
+    TIMING_RIVER,
+    ENTRY_PHASE,
+    LEAD,
+    CLIP_PHASE,
+    TRANSITION,
+    GATE_PHASE,
     LAST_SEARCH_PHASE,
-) = range(MEMORY, MEMORY + 10)  # fmt: skip
+) = range(MEMORY, MEMORY + 10)
 # Parameters: header; offsets of the packed curves, of the rest phases and of the changes; these blocks; the blend.
 RIVERS, TUBE, LAPS, BLEND, CURVES = range(5)
 _MAX_PACE = 2.0  # largest pace, in multiples of the river's, of a hand that no river holds: a faster one plays no clip

@@ -112,9 +112,15 @@ class RobotArm(KernelMap):
     map_kernel = staticmethod(robot_arm_map)
 
     def __init__(
-        self, lengths: Sequence[float], home: npt.ArrayLike, orientation: npt.ArrayLike, scale: float,
-        reach: tuple[float, float], turn: tuple[float, float], arm_angle: float,
-    ) -> None:  # fmt: skip
+        self,
+        lengths: Sequence[float],
+        home: npt.ArrayLike,
+        orientation: npt.ArrayLike,
+        scale: float,
+        reach: tuple[float, float],
+        turn: tuple[float, float],
+        arm_angle: float,
+    ) -> None:
         q = np.asarray(orientation, dtype=float)
         numbers = (*np.ravel(home), scale, *reach, *turn, *(q / np.linalg.norm(q)), *lengths, arm_angle)
         super().__init__(np.array(numbers, dtype=float))

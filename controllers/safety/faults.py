@@ -143,9 +143,15 @@ def _is_repeated(faults: Array, t: float, sequence: float) -> bool:
 
 @njit
 def judge_reading(
-    faults: Array, theta: tuple[float, float, float], gimbal: tuple[float, float, float], last: Array, t: float,
-    clock: float, sequence: float, held: bool,
-) -> int:  # fmt: skip
+    faults: Array,
+    theta: tuple[float, float, float],
+    gimbal: tuple[float, float, float],
+    last: Array,
+    t: float,
+    clock: float,
+    sequence: float,
+    held: bool,
+) -> int:
     """Check the joint angles of a reading for plausibility, and latch faults.
 
     Parameters

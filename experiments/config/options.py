@@ -356,8 +356,11 @@ def with_options(config: RunConfig, words: Mapping[str, object]) -> RunConfig:
 def options_of(config: RunConfig) -> dict[str, object]:
     """The options of a configuration: the inverse of `run_config`."""
     words: dict[str, object] = {
-        "seconds": config.seconds, "seed": config.seed, "mode": config.mode.kind, "figure": config.figure.kind,
-    }  # fmt: skip
+        "seconds": config.seconds,
+        "seed": config.seed,
+        "mode": config.mode.kind,
+        "figure": config.figure.kind,
+    }
     if not config.leads:
         words |= {"map": config.map.kind, "user": config.user.does}
     for part in (config.mode, config.map, config.user, config.figure, config.device, config.clock):

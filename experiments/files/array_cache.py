@@ -13,9 +13,12 @@ from sim.compilation.whole_files import read_hashed, write_hashed
 
 
 def cached_array(
-    folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...],
+    folder: Path,
+    name: str,
+    made_of: Iterable[npt.NDArray[np.generic]],
+    shape: tuple[int, ...],
     find: Callable[[], Array],
-) -> Array:  # fmt: skip
+) -> Array:
     """The cached array of these inputs; if there is none, it is computed and stored.
 
     A file carries a hash of its content: one that is truncated, changed or of another shape is not used. If the file

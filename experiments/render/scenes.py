@@ -64,9 +64,12 @@ Camera = Literal["three-quarter", "front", "side", "back", "above"]
 
 # Viewing directions: azimuth relative to the figure's heading (180: from the front), elevation [degrees].
 CAMERAS: dict[Camera, tuple[float, float]] = {
-    "three-quarter": (205.0, -9.0), "front": (180.0, -6.0), "side": (90.0, -6.0), "back": (0.0, -9.0),
+    "three-quarter": (205.0, -9.0),
+    "front": (180.0, -6.0),
+    "side": (90.0, -6.0),
+    "back": (0.0, -9.0),
     "above": (205.0, -50.0),
-}  # fmt: skip
+}
 GHOST_SPACING = 0.95  # distance of the ghost from the figure, to the side [m]
 GHOST_DEPTH = 0.35  # and away from the camera [m]
 FRAME_SCALE = 1.1  # size of the picture relative to its required contents

@@ -26,9 +26,13 @@ from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 from models.mocap.motion.clip import Clip
 
 MODE_SETUPS: dict[str, Callable[..., Parts]] = {
-    "follow": follow_parts, "bunny": bunny_parts, "rivers": rivers_parts, "stretch": stretch_parts,
-    "stretch-then-follow": stretch_then_follow_parts, "lead": lead_parts,
-}  # fmt: skip
+    "follow": follow_parts,
+    "bunny": bunny_parts,
+    "rivers": rivers_parts,
+    "stretch": stretch_parts,
+    "stretch-then-follow": stretch_then_follow_parts,
+    "lead": lead_parts,
+}
 """By kind of mode: the function that makes the parts of a run from configuration, mode and map."""
 
 

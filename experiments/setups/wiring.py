@@ -58,9 +58,12 @@ MapsOf = Callable[[RunConfig, mujoco.MjModel, tuple[Clip, ...] | None], MapParts
 
 @on_one_blas_thread
 def wire(
-    config: RunConfig, clips: tuple[Clip, ...] | None = None, ready: Ready = lambda units: None,
-    device: DeviceOf | None = None, maps_of: MapsOf = map_parts,
-) -> Session:  # fmt: skip
+    config: RunConfig,
+    clips: tuple[Clip, ...] | None = None,
+    ready: Ready = lambda units: None,
+    device: DeviceOf | None = None,
+    maps_of: MapsOf = map_parts,
+) -> Session:
     """Wire a run from its configuration.
 
     Parameters
@@ -162,10 +165,13 @@ def _required_units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
     ticks, frames = make_logs(servo, servo.figure_ticks)
     loop = (typeof(servo), types.int64, types.int64, types.boolean, typeof(ticks), typeof(frames))
     units = [
-        Unit.of(run_block, *loop), *device_units(servo.device), *follow_units(servo.figure, servo.reference),
-        *units_of_map(np.concatenate([servo.reference.stages, servo.field.maps.stages])), *units_of_laws(parts.program),
+        Unit.of(run_block, *loop),
+        *device_units(servo.device),
+        *follow_units(servo.figure, servo.reference),
+        *units_of_map(np.concatenate([servo.reference.stages, servo.field.maps.stages])),
+        *units_of_laws(parts.program),
         poses_unit(),
-    ]  # fmt: skip
+    ]
     units += [derivative_unit()] * parts.begins_in_motion
     units += [lower_start_unit()] * (parts.bends and parts.config.body != "robot")
     return (*units, *([along_unit(servo.reference)] * parts.maps.plays_rivers))

@@ -62,10 +62,13 @@ def measured_change(poses: Array, period: float = PERIOD) -> Change:
     feet.add(poses)
     jumps = np.abs(np.diff(pose_difference(poses[:-1], poses[1:]) / period, axis=0))
     return Change(
-        slide=feet.slide, height=float(heights.min(axis=1).max()), depth=float(-heights.min()),
-        horizontal_jump=float(jumps[:, :2].max()), vertical_jump=float(jumps[:, 2].max()),
+        slide=feet.slide,
+        height=float(heights.min(axis=1).max()),
+        depth=float(-heights.min()),
+        horizontal_jump=float(jumps[:, :2].max()),
+        vertical_jump=float(jumps[:, 2].max()),
         joint_jump=float(jumps[:, 6:].max()),
-    )  # fmt: skip
+    )
 
 
 def rivers_that_play(names: tuple[str, ...]) -> RiverClips:

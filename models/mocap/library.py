@@ -202,9 +202,12 @@ def writing(target: Path) -> Generator[None]:
 
 
 def convert(
-    source: Path, target: Path, overwrite: bool = False, hints: Hints | None = None,
+    source: Path,
+    target: Path,
+    overwrite: bool = False,
+    hints: Hints | None = None,
     writers: Mapping[str, Writer] | None = None,
-) -> Loaded:  # fmt: skip
+) -> Loaded:
     """Read any motion file and write it on the figure's 57 channels: retargeted and put on the floor, not prepared.
 
     Parameters

@@ -72,9 +72,16 @@ def plausibility(period: float, silent: float = SILENT_PERIODS) -> Plausibility:
 
 @njit
 def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
-    hand: Array, memory: Array, keep: float, period: float, theta: Angles, gimbal: Angles, t: float, switch: float,
+    hand: Array,
+    memory: Array,
+    keep: float,
+    period: float,
+    theta: Angles,
+    gimbal: Angles,
+    t: float,
+    switch: float,
     verdict: int,
-) -> None:  # fmt: skip
+) -> None:
     r"""Fill a hand vector from joint angles read at time t.
 
     Joint rates are backward differences of the encoder angles through a first-order low-pass,

@@ -136,9 +136,12 @@ def _judge(motion: BodyMotion, span: tuple[int, int], tolerance: BallisticTolera
 
 
 def ballistic_verdict(
-    motion: BodyMotion, flights: Sequence[FlightJudgement], tolerance: BallisticTolerance, doubts: Sequence[str] = (),
+    motion: BodyMotion,
+    flights: Sequence[FlightJudgement],
+    tolerance: BallisticTolerance,
+    doubts: Sequence[str] = (),
     measures: Mapping[str, object] | None = None,
-) -> Verdict:  # fmt: skip
+) -> Verdict:
     """Verdict on a whole motion: that of its worst flight, but unknown if its support may not be real contact.
 
     `doubts` and `measures` are those of `contact_doubts`.

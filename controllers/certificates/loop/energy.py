@@ -173,9 +173,14 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     allowed, (distance, felt) = pushed.most(), pushed.bounds(push)
     figures = _power_figures(river, moving, executed) | {
         "speed_bound": float(_curve_speed(moving).max()) + push / river.b_d if river.b_d > 0.0 else None,
-        "peak_gain": gain.distance, "force_gain": gain.force, "own_force": pushed.own, "push": push,
-        "push_allowed": allowed, "distance_bound": distance, "force_bound": felt,
-    }  # fmt: skip
+        "peak_gain": gain.distance,
+        "force_gain": gain.force,
+        "own_force": pushed.own,
+        "push": push,
+        "push_allowed": allowed,
+        "distance_bound": distance,
+        "force_bound": felt,
+    }
     assumptions = (
         "power_bound is the ideal law's; the executed one gives a hand that vibrates with V m/s RMS at most "
         f"{executed.rounding:.2g} N V more below {executed.passive_below:.0f} Hz, and up to {BANDS[-1]:.0f} Hz "

@@ -71,12 +71,15 @@ def passivity(river: River) -> Verdict:
     wall_stiffness = np.minimum(2.0 * damping / period, 2.0 * coulomb / resolution).min(axis=1)
     margin = float(damping.min()) - needed
     figures: dict[str, object] = {
-        "phases": river.phases(), "damping": damping.min(axis=1), "damping_needed": needed,
+        "phases": river.phases(),
+        "damping": damping.min(axis=1),
+        "damping_needed": needed,
         "damping_needed_unfiltered": 0.5 * river.k_r * period + river.b_d,
         "stiffness_colgate": 2.0 * damping.min(axis=1) / period,
-        "stiffness_quantised": 2.0 * (coulomb / resolution).min(axis=1), "stiffness_abbott_okamura": wall_stiffness,
+        "stiffness_quantised": 2.0 * (coulomb / resolution).min(axis=1),
+        "stiffness_abbott_okamura": wall_stiffness,
         "frequency": frequency,
-    }  # fmt: skip
+    }
     assumptions = ("one axis at a time, the worst direction across the curve", "viscous friction of the device alone")
     reason = (
         f"the device's damping is {damping.min():.3g} N s/m, {needed:.3g} N s/m are needed at {frequency:.0f} rad/s; "

@@ -243,13 +243,16 @@ def _figures(river: River, found: _HandResults) -> dict[str, object]:
     unloaded = SampledLoop(river.still(), river.sampling)
     radius = unloaded.radius(river.k_r, river.b_d)
     return {
-        "phases": river.phases(), "radius": radius, "radius_bound": found.bound,
+        "phases": river.phases(),
+        "radius": radius,
+        "radius_bound": found.bound,
         "decay_rate": -np.log(np.maximum(radius, 1e-12)) / river.sampling.period,
         "critical_stiffness": found.critical.min(axis=0),
         "critical_damping": float(critical_damping(unloaded, river.k_r, max(river.b_d, 1e-3)).min()),
-        "delay_margin": delay_margin(unloaded, river.k_r, river.b_d), "multiplier": found.multiplier,
+        "delay_margin": delay_margin(unloaded, river.k_r, river.b_d),
+        "multiplier": found.multiplier,
         "radius_cut": found.cut,
-    }  # fmt: skip
+    }
 
 
 def counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, object]:

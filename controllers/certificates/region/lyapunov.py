@@ -233,8 +233,12 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     form, size = form_of(x), x[2 * entries + 5]
     barrier = _barrier(axis, cell, limits, form, size, s)
     options = {
-        "ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes", "ipopt.max_iter": 200, "show_eval_warnings": False,
-    }  # fmt: skip
+        "ipopt.print_level": 0,
+        "print_time": 0,
+        "ipopt.sb": "yes",
+        "ipopt.max_iter": 200,
+        "show_eval_warnings": False,
+    }
     with raise_lost_interrupts():
         first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(

@@ -286,15 +286,29 @@ ASSUMPTIONS = (
 def _figures(axis: Axis, found: CertifiedRegion) -> dict[str, object]:
     offset, speed = found.offsets(axis)
     return {
-        "distance": offset, "speed": speed, "ball": found.rest.distance * found.ball,
-        "largest_distance": found.rest.distance * found.level, "largest_force": found.rest.force * found.level,
-        "rate": float(found.form.rate), "remainder_rate": found.rest.rate, "remainder_drift": found.rest.drift,
-        "remainder_force": found.rest.newtons, "held_up": found.held_up, "level": found.level, "ball_level": found.ball,
-        "shift": found.rest.shift, "cells": float(found.checked.cells), "cell_slack": found.checked.slack,
-        "cell_least": found.checked.least, "scale": axis.scale, "alpha": found.form.alpha, "beta": found.form.beta,
-        "hand": found.form.hand, "masses": np.array([found.cell.low[0], found.cell.high[0]]),
+        "distance": offset,
+        "speed": speed,
+        "ball": found.rest.distance * found.ball,
+        "largest_distance": found.rest.distance * found.level,
+        "largest_force": found.rest.force * found.level,
+        "rate": float(found.form.rate),
+        "remainder_rate": found.rest.rate,
+        "remainder_drift": found.rest.drift,
+        "remainder_force": found.rest.newtons,
+        "held_up": found.held_up,
+        "level": found.level,
+        "ball_level": found.ball,
+        "shift": found.rest.shift,
+        "cells": float(found.checked.cells),
+        "cell_slack": found.checked.slack,
+        "cell_least": found.checked.least,
+        "scale": axis.scale,
+        "alpha": found.form.alpha,
+        "beta": found.form.beta,
+        "hand": found.form.hand,
+        "masses": np.array([found.cell.low[0], found.cell.high[0]]),
         "ellipse": _ellipses(axis, found),
-    }  # fmt: skip
+    }
 
 
 def _ellipses(axis: Axis, found: CertifiedRegion) -> Array:

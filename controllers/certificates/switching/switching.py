@@ -271,13 +271,17 @@ def switching(
         (float(r.least[r.distance < 2.0 * r.width].min(initial=math.inf)) for r in competing_rivers), default=math.inf
     )
     figures: dict[str, object] = {
-        "push_allowed": allowed, "score_bound": max(bound.score for bound in bounds),
+        "push_allowed": allowed,
+        "score_bound": max(bound.score for bound in bounds),
         "distance_bound": max(bound.distance for bound in bounds),
-        "velocity_noise": max(retention.noise for retention in retentions), "hysteresis": sharing.hysteresis,
-        "hysteresis_dwell": hysteresis_dwell(retentions, push), "least_mismatch": least,
+        "velocity_noise": max(retention.noise for retention in retentions),
+        "hysteresis": sharing.hysteresis,
+        "hysteresis_dwell": hysteresis_dwell(retentions, push),
+        "least_mismatch": least,
         "rival_weight": math.exp(-0.5 * (least / sharing.sigma) ** 2),
-        "common_rate": None if common is None else common.rate, "common_p": None if common is None else common.p,
-    }  # fmt: skip
+        "common_rate": None if common is None else common.rate,
+        "common_p": None if common is None else common.p,
+    }
     assumptions = (
         "the loop is linear across the curve; kinematics and inertia off the curve are those on it",
         "the hand begins where its river carries it; its force is bounded and has no impedance",

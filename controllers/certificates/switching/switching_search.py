@@ -156,9 +156,14 @@ Simulation = Callable[[Array, Array, float, Push], Course]
 
 
 def counterexample(
-    field: HigherOrder, own: int, river: River, phase: float, towards: Array, pushes: Iterable[float],
+    field: HigherOrder,
+    own: int,
+    river: River,
+    phase: float,
+    towards: Array,
+    pushes: Iterable[float],
     simulate: Simulation,
-) -> dict[str, object]:  # fmt: skip
+) -> dict[str, object]:
     """First hand that the field fails to keep, confirmed by a simulation: initial state, force and times.
 
     The hands tried start on the river 0.6 s before the phase, at rest, or at the river's pace if a hand at rest would

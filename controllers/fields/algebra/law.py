@@ -251,9 +251,13 @@ class Program(Law):
 
     @staticmethod
     def of(
-        law: Law, kernel: Kernel, params: Sequence[float] | Array, memory: Sequence[float] | Array,
-        curve: Trajectory | None = None, feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
-    ) -> "Program":  # fmt: skip
+        law: Law,
+        kernel: Kernel,
+        params: Sequence[float] | Array,
+        memory: Sequence[float] | Array,
+        curve: Trajectory | None = None,
+        feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
+    ) -> "Program":
         """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
 
         The law's memory begins at `TRACE_SIZE`.

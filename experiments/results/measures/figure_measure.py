@@ -68,13 +68,21 @@ class FigureMeasure:
         """Summary of all frames so far."""
         up, stance, flight = max(self._up, 1), self._stance.summary(), self._flight.summary()
         return FigureSummary(
-            falls=tuple(self._falls), fell_at=self._falls[0] if self._falls else None,
-            seconds=self._frames / self._rate, up_seconds=self._up / self._rate,
-            joint_error_rms_deg=math.degrees(self._joints.root), root_error_rms_cm=100.0 * self._root.root,
-            root_error_max_cm=100.0 * self._root.largest, residual_force_rms=stance.force_rms, stance=stance,
-            flight=flight, without_ground_force=self._airborne.summary(),
-            residual_in_flight_max=max(flight.force_max, flight.moment_max), flight_seconds=flight.seconds,
-            lost_contact_seconds=self._lost / self._rate, saturated=self._saturated / up / (N_TANGENT - 6),
+            falls=tuple(self._falls),
+            fell_at=self._falls[0] if self._falls else None,
+            seconds=self._frames / self._rate,
+            up_seconds=self._up / self._rate,
+            joint_error_rms_deg=math.degrees(self._joints.root),
+            root_error_rms_cm=100.0 * self._root.root,
+            root_error_max_cm=100.0 * self._root.largest,
+            residual_force_rms=stance.force_rms,
+            stance=stance,
+            flight=flight,
+            without_ground_force=self._airborne.summary(),
+            residual_in_flight_max=max(flight.force_max, flight.moment_max),
+            flight_seconds=flight.seconds,
+            lost_contact_seconds=self._lost / self._rate,
+            saturated=self._saturated / up / (N_TANGENT - 6),
             grounded=1.0 - self._lost / self._rate / stance.seconds if stance.seconds else 1.0,
             ground_force_mean=self._ground / up / self._weight,
-        )  # fmt: skip
+        )

@@ -43,9 +43,12 @@ _FRAME_CHANNELS = ("t", "reference", "joint_error", "root_error", "residual", "g
 
 
 def summarise(
-    recording: Recording, default_poses: Callable[[Array, Array, Array], Array], speed: SpeedSummary,
-    warnings: dict[str, int], handled: Sequence[Span] = (),
-) -> RunSummary:  # fmt: skip
+    recording: Recording,
+    default_poses: Callable[[Array, Array, Array], Array],
+    speed: SpeedSummary,
+    warnings: dict[str, int],
+    handled: Sequence[Span] = (),
+) -> RunSummary:
     """Measure a run in constant memory.
 
     Parameters

@@ -51,7 +51,11 @@ def stretch_summary(tubes: StretchyTubes, memory: Array) -> StretchSummary:
     bent, phases = tubes.edited(memory), np.linspace(tubes.curve.start, tubes.curve.end, 2001)
     moved = np.linalg.norm(bent.point(phases) - tubes.curve.point(phases), axis=1)
     return StretchSummary(
-        edits=len(tubes.edits(memory)), largest_mm=1e3 * float(moved.max()), changed=float(np.mean(moved > 1e-9)),
-        held_off_m=tubes.held_off(memory), length_before_mm=1e3 * tubes.curve.length, length_after_mm=1e3 * bent.length,
+        edits=len(tubes.edits(memory)),
+        largest_mm=1e3 * float(moved.max()),
+        changed=float(np.mean(moved > 1e-9)),
+        held_off_m=tubes.held_off(memory),
+        length_before_mm=1e3 * tubes.curve.length,
+        length_after_mm=1e3 * bent.length,
         reach_mm=1e3 * bent.reach,
-    )  # fmt: skip
+    )

@@ -21,11 +21,17 @@ _CURVE_FLOW, _PARALLEL_FLOW = {"flow": "curve"}, {"flow": "parallel"}
 
 _ModeDefaults = Mapping[type, Mapping[str, float | str]]
 _CIRCLE_DEFAULTS: _ModeDefaults = {
-    Follow: _CURVE_FLOW, Rivers: _RIVER_GAINS, Stretch: _TUBE_GAINS, StretchThenFollow: _TUBE_GAINS,
-}  # fmt: skip
+    Follow: _CURVE_FLOW,
+    Rivers: _RIVER_GAINS,
+    Stretch: _TUBE_GAINS,
+    StretchThenFollow: _TUBE_GAINS,
+}
 _FILE_DEFAULTS: _ModeDefaults = {
-    Follow: _PARALLEL_FLOW, Rivers: _FILE_RIVER_GAINS, Stretch: _FILE_TUBE_GAINS, StretchThenFollow: _FILE_TUBE_GAINS,
-}  # fmt: skip
+    Follow: _PARALLEL_FLOW,
+    Rivers: _FILE_RIVER_GAINS,
+    Stretch: _FILE_TUBE_GAINS,
+    StretchThenFollow: _FILE_TUBE_GAINS,
+}
 _DEFAULTS_BY_MAP: Mapping[type, _ModeDefaults] = {
     MapFile: _FILE_DEFAULTS,
     Composite: {**_CIRCLE_DEFAULTS, Follow: _PARALLEL_FLOW},

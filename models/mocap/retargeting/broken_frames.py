@@ -141,9 +141,12 @@ class _Track:
     """
 
     def __init__(
-        self, values: Array, min_jump: float, distance: Callable[[Array, Array], Array],
+        self,
+        values: Array,
+        min_jump: float,
+        distance: Callable[[Array, Array], Array],
         deviation: Callable[[Array], Array],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.values, self.min_jump, self.distance, self.deviation = values, min_jump, distance, deviation
         self.steps = distance(values[:-1], values[1:])
         self.limits = _jump_limits(self.steps, 2)
