@@ -27,7 +27,7 @@ _REPEAT_TOLERANCE = 1e-3  # [m], or components of rotations: largest difference 
 _FASTER_COST = 3.0  # cost of playing faster relative to slower
 _MIN_LAP_DURATION, _MAX_LAP_DURATION = 3.0, 6.0  # [s] limits of a natural lap, unless a loop lasts longer
 # [s] longest natural lap but for one stride of the first loop: at 10 mm/s and less, encoders and friction disturb the
-# hand's pace, so that legs of 6.8 s have 25 % residual in a lap of 68 s, and 12 in one of 27 with arms 2.5 times as fast
+# hand's pace, so that legs of 6.8 s have 25 % residual in a lap of 68 s, and 12 in one of 27 with arms 2.5 as fast
 _MAX_STEADY_LAP = 30.0
 _MIN_TRAVEL = 0.3  # [m] a lap that travels less is not a gait
 

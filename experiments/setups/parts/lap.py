@@ -36,7 +36,7 @@ def lap_remarks(given: Map, filled: Map, seconds: float) -> tuple[str, ...]:
     """
     if isinstance(given, Led) or isinstance(filled, Led) or given.around.lap is not None:
         return ()
-    lap = filled.around.lap
+    lap = _lap_of(filled)
     changes = "; --lap changes it"
     if seconds < lap:
         changes = f", and this run of {seconds:g} s ends before it does; --seconds and --lap change that"
