@@ -26,6 +26,9 @@ _MAX_REPEATS = 12  # largest number of repeats that is tried for a clip
 _REPEAT_TOLERANCE = 1e-3  # [m], or components of rotations: largest difference between repeats
 _FASTER_COST = 3.0  # cost of playing faster relative to slower
 _MIN_LAP_DURATION, _MAX_LAP_DURATION = 3.0, 6.0  # [s] limits of a natural lap, unless a loop lasts longer
+# [s] longest natural lap but for one stride of the first loop: at 10 mm/s and less, encoders and friction disturb the
+# hand's pace, so that legs of 6.8 s have 25 % residual in a lap of 68 s, and 12 in one of 27 with arms 2.5 as fast
+_MAX_STEADY_LAP = 30.0
 _MIN_TRAVEL = 0.3  # [m] a lap that travels less is not a gait
 
 
@@ -89,13 +92,15 @@ def natural_lap(loops: Sequence[Loop], apart: bool = False) -> float:
     """Duration of a lap [s] in which the first loop plays at its own pace, and the others as nearly as possible.
 
     Since the legs of a blend may be those of the first loop, the lap is a whole number of its strides, from 3 to 6 s or
-    the duration of the longest loop; of all within 2 % of the best, the shortest is chosen. A lap of several short
-    cycles gives the hand more time to change the blend. `apart` is as in `fit_to_lap`.
+    the duration of the longest loop, but at most 30 s or a single stride; of all within 2 % of the best, the shortest
+    is chosen. A lap of several short cycles gives the hand more time to change the blend. `apart` is as in
+    `fit_to_lap`.
     """
     first = loops[0]
     stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
     fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
-    highest = int(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)) / stride + _REPEAT_TOLERANCE)
+    longest = min(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)), _MAX_STEADY_LAP)
+    highest = int(longest / stride + _REPEAT_TOLERANCE)
     laps = stride * np.arange(fewest, max(fewest, highest) + 1)
     worst = np.array([max(abs(np.log(one.duration / lap)) for one in fit_to_lap(loops, lap, apart)) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])

@@ -15,7 +15,10 @@ from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
 
-PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; within the motors' continuous limit
+PUSH_FORCE = 2.5  # [N] of a hand that pushes twice a lap; more than the motors' continuous force
+# [s] Longest push, that of a lap of 20 s: then the motors still have 2 N more. After 11 s they are too hot to hold the
+# hand, and it is thrown out.
+_MAX_PUSH_TIME = 6.0
 # [N] of a push into another river: 0.5 N takes none of 12 hands there, 0.9 and 1.1 N ten and eleven, and 2 N throws
 # all of them out (docs/validation/crossing-rivers.md).
 RIVER_PUSH = 1.0
@@ -33,7 +36,7 @@ _REFERENCE_SPEED = 0.0749  # [m/s] of the default rivers, at which these and `RI
 _MAX_SCALED_SPEED = 0.2  # [m/s] in faster rivers a push is the same as at this speed: a harder one throws the hand out
 # Power of the speed's share with which a push is weaker: 0.1 throws hands out, 0.25 leaves some behind.
 _SLOW_FORCE_EXPONENT = 0.2
-_PEAK_SHARE = 0.25  # of the lap: where `lap_pushes` and `lap_turns` have their first peaks
+_PEAK_SHARE = 0.25  # of the lap: where, at the latest, `lap_pushes` and `lap_turns` have their first peaks
 _START_SPREAD = 1e-3  # [m] standard deviation of the start position
 # [m/s] least speed that turns an offset into a phase; largest phase as a share of a lap
 _MIN_START_SPEED, _MAX_START_PHASE = 1e-3, 0.05
@@ -200,7 +203,8 @@ def edited_until(grabs: tuple[Grab, ...]) -> float:
 
 def lap_pushes(start: float, lap: float, force: float = PUSH_FORCE) -> tuple[Push, Push]:
     """A push outwards and one inwards, of peak `force` [N], in the lap that begins at `start` [s]."""
-    return (Push(start + 0.1 * lap, 0.3 * lap, force), Push(start + 0.6 * lap, 0.3 * lap, -force))
+    duration = min(0.3 * lap, _MAX_PUSH_TIME)
+    return (Push(start + 0.1 * lap, duration, force), Push(start + 0.6 * lap, duration, -force))
 
 
 def river_pushes(curve: Trajectory, seconds: float) -> tuple[Push, ...]:

@@ -90,6 +90,12 @@ def test_natural_lap_plays_the_first_clip_at_its_own_pace():
         assert 3.0 <= lap <= 6.0
 
 
+@pytest.mark.parametrize(("first", "lap"), [(42, 29.4), (1200, 40.0)])
+def test_natural_lap_of_long_clips_leaves_the_hand_fast_enough(first, lap):
+    """30 s at most, which keeps 1.4 s and a clip of 70 s as near as possible to their pace, or the first clip alone."""
+    assert natural_lap([loop(swinging(4, first)), loop(swinging(5, 2100))]) == pytest.approx(lap)
+
+
 def test_natural_lap_plays_all_clips_near_their_own_pace_if_possible():
     loops = [loop(swinging(seed, frames)) for seed, frames in ((4, 30), (5, 45), (6, 90))]
     lap = natural_lap(loops)

@@ -1,9 +1,12 @@
 """The default hand of STRETCHY TUBES on laps longer than 4 s: the figure has to follow it, and bends are as wide."""
 
+from typing import cast
+
 import pytest
 
 from experiments.config.modes import StretchyTube
 from experiments.config.options import run_config
+from experiments.config.run_config import RunConfig
 from experiments.setups.modes.stretch import stretch_grabs
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
@@ -14,7 +17,7 @@ def session_of(lap: float) -> Session:
 
 
 def bump_of(session: Session) -> float:
-    mode = session.config.mode
+    mode = cast(RunConfig, session.config).mode
     assert isinstance(mode, StretchyTube)
     assert mode.bump is not None
     return mode.bump

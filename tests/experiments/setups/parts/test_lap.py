@@ -63,5 +63,8 @@ def test_chosen_lap_is_said_and_a_given_one_is_not(slow_jump: str) -> None:
     assert any(remark.startswith("a lap takes 7.2 s, which") for remark in session.remarks)
     assert any("this run of 1 s ends before it does" in remark for remark in session.remarks)
     assert not any("ends before it does" in remark for remark in wire(replace(config, seconds=8.0)).remarks)
+    assert not any("the hand goes round" in remark for remark in session.remarks)
+    narrow = run_config(figure="none", map="composite", clips=(slow_jump, "walk", "walk"), radius=0.012, reach=0.005)
+    assert any("the hand goes round at 10 mm/s" in remark for remark in wire(narrow).remarks)
     assert session.config == resolved(config)
     assert not any("a lap takes" in remark for remark in wire(replace(config, map=resolved(config).map)).remarks)

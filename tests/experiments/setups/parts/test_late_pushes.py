@@ -1,10 +1,12 @@
 """Remarks on the actions of a simulated hand."""
 
+import numpy as np
 import pytest
 
 from controllers.curves.trajectory import Trajectory
+from controllers.safety.limiter import ForceLimiter, force_ceiling
 from experiments.config.run_config import User
-from experiments.setups.parts.hands import late_remark, resolved_user
+from experiments.setups.parts.hands import lap_pushes, late_remark, resolved_user
 from sim.users.hand.actions import Push, Turn
 
 
@@ -29,6 +31,21 @@ def test_a_hand_acts_within_the_run_however_long_the_lap(does: str, lap: float) 
     assert late_remark(user, 20.0) == ()
     first = (user.pushes + user.turns)[0].at
     assert first == pytest.approx(lap + (0.1 * lap if does == "push" else 0.0)) or lap > 15.0
+
+
+@pytest.mark.parametrize("lap", [4.0, 20.0, 40.0, 80.0])
+def test_motors_can_hold_a_hand_that_pushes(lap: float) -> None:
+    limiter, period, heat = ForceLimiter(0.01), 0.01, 0.0
+    pushes = [push for k in range(3) for push in lap_pushes(k * lap, lap)]
+    for t in np.arange(0.0, 3.0 * lap, period):
+        phases = [(t - push.at) / push.seconds for push in pushes]
+        force = sum(
+            abs(push.force) * np.sin(np.pi * phase) ** 2
+            for push, phase in zip(pushes, phases, strict=True)
+            if 0.0 < phase < 1.0
+        )
+        assert force_ceiling.py_func(heat, limiter.continuous, limiter.peak) > force + 1.5
+        heat += (force**2 - heat) * period / limiter.thermal_time
 
 
 def test_a_turn_past_the_end_is_reported() -> None:
