@@ -2,12 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from controllers.curves.trajectory import Trajectory
 from experiments.config.maps import Composite, Cylindrical, Led, Map, MapFile, RiverClips, RobotArm
 from models.mocap.library import embedded_names
 
 DEFAULT_LAP = 4.0
 """Duration of a lap [s] about a map's circle that plays embedded clips only, or none."""
+
+# [m/s] With b of 8 N s/m the Phantom's friction of some 50 mN lags a hand by 6 mm/s. The flow compensates for that, and
+# a parallel flow for r/R times as much: the pace of a hand pushed by 8 mm was 1.25 at 4 mm/s, where a figure fell.
+_MIN_STEADY_SPEED = 0.012
 
 
 def with_lap(part: Map) -> Map:
@@ -24,19 +30,23 @@ def with_lap(part: Map) -> Map:
 
 
 def lap_remarks(given: Map, filled: Map, seconds: float) -> tuple[str, ...]:
-    """Remark on a lap that was chosen by the clips of a map, in a run of this duration [s].
+    """Remarks on a lap that was chosen by the clips of a map, in a run of this duration [s].
 
-    There is none if the lap was given, or is the default.
+    There are none if the lap was given, or is the default.
     """
     if isinstance(given, Led) or isinstance(filled, Led) or given.around.lap is not None:
         return ()
-    lap = filled.around.lap
-    if lap is None or lap == DEFAULT_LAP:
-        return ()
+    lap = _lap_of(filled)
     changes = "; --lap changes it"
     if seconds < lap:
         changes = f", and this run of {seconds:g} s ends before it does; --seconds and --lap change that"
-    return (f"a lap takes {lap:.1f} s, which suits these clips best{changes}",)
+    remark = f"a lap takes {lap:.1f} s, which suits these clips best{changes}"
+    speed = 2.0 * np.pi * filled.around.radius / lap
+    slow = (
+        f"the hand goes round at {1e3 * speed:.0f} mm/s: so slowly that a push, or a person's unsteady hand, changes "
+        "the clips' pace by a tenth and more, and the figure may fall; shorter clips or a larger --radius help"
+    )
+    return () if lap == DEFAULT_LAP else (remark, slow) if speed < _MIN_STEADY_SPEED else (remark,)
 
 
 def circle_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -> Trajectory:
