@@ -19,7 +19,7 @@ from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts
 from experiments.setups.parts.clips import load_clips
-from experiments.setups.parts.led_figure import led_parts
+from experiments.setups.parts.led_figure import led_clips, led_parts
 from experiments.setups.parts.part_types import ClipMapParts, MapParts, Parts
 from models.humanoid.skeleton import DEFAULT_STATURE, figure_model, proportion
 from models.mocap.motion.clip import Clip
@@ -61,7 +61,7 @@ def clips_for(part: Map) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     ModelError
         If there is no such clip, or a file cannot be read.
     """
-    return load_clips(part.clips, part.raw)
+    return led_clips(part) if isinstance(part, Led) else load_clips(part.clips, part.raw)
 
 
 def map_parts(config: RunConfig, body: MjModel, clips: tuple[Clip, ...] | None = None) -> MapParts[Any]:

@@ -20,7 +20,6 @@ from experiments.results.measures.summary import RunSummary
 from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
-from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.hands import (
     PAUSE_TIME,
@@ -46,6 +45,9 @@ REACH_TIME = 1.8
 PRESS_RATIO = 2.2
 EASE_TIME = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
 _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
+_MIN_FLIGHT_DURATION = (
+    0.05  # [s] shortest flight of a clip that counts: half or twice the value changes none of eight captures
+)
 
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
@@ -143,7 +145,7 @@ def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ..
     over: list[str] = []
     for clip in clips:
         air = ~contacts(clip).supported
-        if max((end - start for start, end in spans(air)), default=0) <= MIN_CLIP_FLIGHT_DURATION * clip.fps:
+        if max((end - start for start, end in spans(air)), default=0) <= _MIN_FLIGHT_DURATION * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.

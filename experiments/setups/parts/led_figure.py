@@ -10,18 +10,21 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from controllers.legs.limbs import Limb
 from controllers.walking.gait import Gait
+from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
 from experiments.fitting.balance import balanced_on_ground, imbalance_at_rest
 from experiments.fitting.figure_legs import figure_legs
+from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
 from geometry.arrays import Mask
 from models.humanoid.skeleton import proportion
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded_names
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import best_lap
+from models.mocap.preparation.looping import close_or_rest
 from sim.world.world import FigureKind
 
 MAX_STEP = 0.75
@@ -69,6 +72,20 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
     )  # fmt: skip
 
 
+def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+    """The clip that is led, and remarks about it: of a file in which no cycle is found, the best lap is prepared.
+
+    Raises
+    ------
+    ModelError
+        If there is no such clip, or a file cannot be read.
+    """
+    clips, remarks = load_clips(part.clips, part.raw)
+    if part.raw or all(clip.closes(CLOSURE_TOLERANCE) for clip in clips):
+        return clips, remarks
+    return load_clips(part.clips, loop="lap")
+
+
 def is_authored(config: RunConfig) -> bool:
     """Whether the clip that is led is an embedded one."""
     return config.map.clips[0] in embedded_names()
@@ -77,18 +94,17 @@ def is_authored(config: RunConfig) -> bool:
 def led_map(clip: Clip, figure: mujoco.MjModel, authored: bool = True) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
-    A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is a clip with flights that is not authored, or for which no other form without
-    flights exists. A figure of another stature moves in proportion, with strides of its size.
+    A clip is led as it is, but one with flights that is not authored, or for which no other form without flights
+    exists, by steps; one that does not close is closed first. A figure of another stature moves in proportion, with
+    strides of its size.
 
     Raises
     ------
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    lap = best_lap(clip)
-    marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
-    clip, legs, stance = lap.clip.resized(proportion(figure)), figure_legs(figure), marks.planted[:-1]
+    cycle = clip if clip.closes(CLOSURE_TOLERANCE) else close_or_rest(clip, "lap").clip
+    clip, legs, stance = cycle.resized(proportion(figure)), figure_legs(figure), contacts(cycle).planted[:-1]
     as_recorded = _map_and_gait(clip, legs, stance)
     if not as_recorded[0].flies or (authored and as_recorded[0].has_grounded_form):
         return as_recorded
