@@ -27,7 +27,7 @@ from geometry.arrays import Array, Mask
 # σ₋, σ₊: the excess of their sum over 1 gives a double support of a tenth of the flight. If the flight is divided 0.6
 # to 0.4 instead of equally, the pelvis is lowered by 7 cm more (docs/validation/led-figures.md).
 _FLIGHT_SHARES = 0.5, 0.6
-_STEP_SHARES = 0.9, 0.9  # of steps: STEPNOTE
+_STEP_SHARES = 1.0, 1.0  # of `stepping`: a double support takes the place of each flight, and is as long
 # [m] height up to which a swinging foot of shortened steps keeps its clearance: lower than 6 mm it would bear load
 _KEPT_CLEARANCE = 0.01
 # [m] largest lowering of the root; a longer leap cannot become a step: CMU 02_03 needs 0.26, SNU 0.83
@@ -97,6 +97,8 @@ def stepping(
     Steps longer than `longest` [m] are shortened to it: the root's advance and, above `_KEPT_CLEARANCE`, the height of
     swinging feet in proportion, or a foot that kicks up behind would fold the leg under a root that is lower.
     """
+    if not standing.any(axis=0).all():
+        return None
     steps = min(stride, longest * len(runs(~np.any(standing, axis=1))))
     ratio, first, result = steps / stride, rows.shape[1] - N_END_CHANNELS * len(limbs), rows.copy()
     result[:, 0] *= ratio

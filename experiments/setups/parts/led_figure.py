@@ -81,7 +81,10 @@ def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
         If there is no such clip, or a file cannot be read.
     """
     clips, remarks = load_clips(part.clips, part.raw)
-    if part.raw or all(clip.closes(CLOSURE_TOLERANCE) for clip in clips):
+    if part.raw:
+        slides = "led as captured: its feet slide, and the physical figure may fall; without --raw it is prepared"
+        return clips, (*remarks, *(f"{name}: {slides}" for name in part.clips if name not in embedded_names()))
+    if all(clip.closes(CLOSURE_TOLERANCE) for clip in clips):
         return clips, remarks
     return load_clips(part.clips, loop="lap")
 
