@@ -30,7 +30,7 @@ _FLIGHT_SHARES = 0.5, 0.6
 _STEP_SHARES = 1.0, 1.0  # of `stepping`: a double support takes the place of each flight, and is as long
 # [m] height up to which a swinging foot of shortened steps keeps its clearance: lower than 6 mm it would bear load
 _KEPT_CLEARANCE = 0.01
-# [m] largest lowering of the root; a longer leap cannot become a step: prepared runs need up to 0.15, a run whose leaps
+# [m] largest lowering of the root; a longer leap cannot become a step: prepared runs need up to 0.24, a run whose leaps
 # are 1 m longer 0.32
 _MAX_LOWERING = 0.35
 
