@@ -31,9 +31,8 @@ _MAX_HAND_SPEED = 0.6
 # Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures with a prototype: ±1 cm and
 # ±0.1 m/s change the residual of the prepared motions by less than 1 percentage point.
 _MAX_STANCE_HEIGHT, _MAX_STANCE_SPEED = 0.045, 0.55
-# Fraction of the root's speed below which they stand, too, but do not rest. If they rested, SNU's run in leading would
-# have a residual of 15 % of body weight instead of 8 %, and the embedded run's soles would slide by 3.8 cm instead of
-# 2.4 cm.
+# Fraction of the root's speed below which they stand, too, but do not rest. If they rested, the soles of the embedded
+# run that is led would slide by 3.8 cm instead of 2.4 cm.
 _ROOT_SPEED_FRACTION = 0.3
 # Half or twice any of the next four values changes whether a sphere stands in at most 0.9 % of the frames of 19
 # captures (in one capture 9 %, if stances of up to 0.12 s are dropped).
