@@ -14,7 +14,6 @@ Channels are (1 − u) ρ + u ρ_grounded; u, the share of the grounded form, is
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -24,12 +23,9 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
 from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.cyclic_runs import runs
-from controllers.legs.grounded import grounded, max_swing_speed_ratio
+from controllers.legs.grounded import grounded, max_swing_speed_ratio, stepping
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
-from controllers.legs.reaching import solve_reach
-from controllers.legs.skate_removal import with_planted_ends
-from controllers.motion.captures import Capture, low_pass
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, rotate_in_plane, turn_of
 from controllers.walking.walked_path import (
@@ -186,37 +182,6 @@ def led_map(params: Array, x: Array, path: Array, pose: Array, jacobian: Array) 
                 jacobian[3 + 3 * joint : 6 + 3 * joint, by] = spins[joint, :, by]
 
 
-class _ClipForms(NamedTuple):
-    """Rows of a led clip in its forms, the length of a lap [m], and attributes of `Led`."""
-
-    rows: list[Array]
-    stride: float
-    flies: bool = False
-    has_grounded_form: bool = False
-    pace: float = 1.0
-
-
-def _forms_of_capture(
-    rows: Array, channels: Array, drift: Array, limbs: Sequence[Limb], stance: Mask, capture: Capture, duration: float,
-    sway: Array,
-) -> _ClipForms:  # fmt: skip
-    """Form of a capture: feet held in stance, flight phases turned into steps unless it hops on one foot or leaps far.
-
-    `duration` is that of a lap [s]; the other arguments are those of `with_planted_ends`.
-    """
-    flights, stride, still = runs(~np.any(stance, axis=1)), float(drift[0]), np.zeros((2, 2))
-    # A flight phase of the capture becomes a walking step, which is shorter.
-    steps = min(stride, capture.step * len(flights)) if flights else stride
-    clip_and_limbs = (channels, drift, limbs, stance, capture.radius, duration)
-    planted = with_planted_ends(rows, *clip_and_limbs, steps, still if flights else sway)
-    low = grounded(planted, closing_signs(rows, (channels.shape[1] - 3) // 4), steps, limbs, stance, sway)
-    if low is not None:
-        return _ClipForms([solve_reach(low, steps, limbs)], steps, False, True, 1.0 / max_swing_speed_ratio(stance))
-    if flights:
-        planted = with_planted_ends(rows, *clip_and_limbs, stride, still)
-    return _ClipForms([planted], stride, bool(flights))
-
-
 class Led(KernelMap):
     r"""A travelling clip on the path of a figure that is led (see `controllers.fields.leading`).
 
@@ -234,19 +199,16 @@ class Led(KernelMap):
         Phase of the lap at s = 0, as a share of the lap.
     standing : array of bool, shape (m, limbs), optional
         Which limbs are in stance, at m equal steps of the lap; no limb is in flight phases. Without it u has no effect.
-    capture : Capture, optional
-        How a motion capture is cleaned up: low-passed, feet in stance held (`planted`), and flight phases removed
-        whatever u is, unless the figure hops on one foot. Without it the clip is used as it is.
+    longest_step : float, optional
+        The clip steps instead of flying, whatever u is, by steps of this length at most [m], unless it hops on one
+        foot. Without it, it flies at u = 0.
     sway : Array, shape (k, 2), optional
-        Displacement over the floor of the root of a form without flights, or of a capture [m], at k equal steps of the
-        lap.
+        Displacement over the floor of the root of the form without flights [m], at k equal steps of the lap.
 
     Attributes
     ----------
     flies, has_grounded_form : bool
         Whether it has flight phases at u = 0, and whether it has a form without the flight phases of its clip.
-    sways : bool
-        Whether the sway affects any of its forms.
     stride, duration : float
         Length [m] and duration [s] of a lap; shorter than the clip's if its steps would be too long without flights.
     pace : float
@@ -266,10 +228,10 @@ class Led(KernelMap):
         limbs: Sequence[Limb],
         phase: float = 0.0,
         standing: Mask | None = None,
-        capture: Capture | None = None,
+        longest_step: float | None = None,
         sway: Array | None = None,
     ) -> None:
-        self._arguments = (clip, tuple(limbs), phase, standing, capture, sway)
+        self._arguments = (clip, tuple(limbs), phase, standing, longest_step, sway)
         poses, fps = clip
         checked = checked_clip(poses, fps, "the clip that is led")
         loop, (net, turns) = forward_loop(checked, fps), turn_of(checked)
@@ -284,30 +246,29 @@ class Led(KernelMap):
                 f"{np.degrees(MAX_TURN):.0f}°; this one goes {self.stride:.2f} m and turns "
                 f"{np.degrees(turn):.0f}°. Walk and run do{advice}"
             )
-        samples = int(np.clip(len(poses) - 1, 64 if capture is None else 256, 2048))
+        samples = int(np.clip(len(poses) - 1, 64, 2048))
         channels = loop.channels(np.arange(samples) / samples, np.zeros(samples))
         # The path is along x, whichever way the figure faces while it walks.
         course = -np.arctan2(loop.drift[1], loop.drift[0])
         channels[:, :2] = rotate_in_plane(course, channels[:, :2])
         channels[:, 3:7] = product(about_axis(2, course), channels[:, 3:7])
-        if capture is not None:
-            channels = low_pass(channels, self.duration, capture.cutoff)
         drift = np.array([[self.stride, 0.0, loop.drift[2]]])
         limbs = [limb.with_limits_for([channels]) for limb in limbs]
         rows = with_ends(channels[:, None], drift, limbs, np.ones(1))[:, 0]
         self._rotations = (channels.shape[1] - 3) // 4
-        signs, clip_forms = closing_signs(rows, self._rotations), _ClipForms([rows], self.stride)
+        signs, forms = closing_signs(rows, self._rotations), [rows]
+        self.flies, self.has_grounded_form, self.pace = False, False, 1.0
         if standing is not None:
             stance = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
             sway = np.zeros((2, 2)) if sway is None else sway
-            if capture is None:
+            self.flies = bool(runs(~np.any(stance, axis=1)))
+            if longest_step is None or not self.flies:
                 low = grounded(rows, signs, self.stride, limbs, stance, sway)
-                flies = bool(runs(~np.any(stance, axis=1)))
-                clip_forms = _ClipForms([rows] if low is None else [rows, low], self.stride, flies, low is not None)
-            else:
-                clip_forms = _forms_of_capture(rows, channels, drift[0], limbs, stance, capture, self.duration, sway)
-        forms, self.stride, self.flies, self.has_grounded_form, self.pace = clip_forms
-        self.sways = self.has_grounded_form or (capture is not None and not self.flies)
+                forms = [rows] if low is None else [rows, low]
+                self.has_grounded_form = low is not None
+            elif (steps := stepping(rows, signs, self.stride, limbs, stance, sway, longest_step)) is not None:
+                forms, self.stride = [steps[0]], steps[1]
+                self.flies, self.has_grounded_form, self.pace = False, True, 1.0 / max_swing_speed_ratio(stance)
         lags = np.array([form[:, channels.shape[1] + 3 :: N_END_CHANNELS] for form in forms])
         self.reach = self.stride * float(np.abs(lags).max(initial=0.0))
         width = _LOWERING_RATIO * max((abs(float(limb.offsets[0, 1])) for limb in limbs), default=0.0)
@@ -317,13 +278,13 @@ class Led(KernelMap):
 
     def with_sway(self, sway: Array) -> "Led":
         """The same map with another sway (k, 2) [m] of the forms without flight phases."""
-        clip, limbs, phase, standing, capture, _ = self._arguments
-        return Led(clip, limbs, phase, standing, capture, sway)
+        clip, limbs, phase, standing, longest_step, _ = self._arguments
+        return Led(clip, limbs, phase, standing, longest_step, sway)
 
     def begun_at(self, phase: float) -> "Led":
         """The same map with another phase of the lap at s = 0."""
-        clip, limbs, _, standing, capture, sway = self._arguments
-        return Led(clip, limbs, phase, standing, capture, sway)
+        clip, limbs, _, standing, longest_step, sway = self._arguments
+        return Led(clip, limbs, phase, standing, longest_step, sway)
 
     @property
     def nq(self) -> int:

@@ -18,21 +18,27 @@ from scipy.ndimage import convolve1d, minimum_filter1d
 
 from controllers.curves.splines import periodic_interpolation
 from controllers.legs.cyclic_runs import runs
+from controllers.legs.limb_ends import SOFTMIN_WIDTH, lowest_point
 from controllers.legs.limbs import N_END_CHANNELS, Limb
-from controllers.legs.reaching import extension, shortfall
+from controllers.legs.reaching import extension, shortfall, solve_reach
 from controllers.motion.channels import signed_like
 from geometry.arrays import Array, Mask
 
 # σ₋, σ₊: the excess of their sum over 1 gives a double support of a tenth of the flight. If the flight is divided 0.6
 # to 0.4 instead of equally, the pelvis is lowered by 7 cm more (docs/validation/led-figures.md).
-_SHARE_AFTER, _SHARE_BEFORE = 0.5, 0.6
-# [m] largest lowering of the root; a longer leap cannot become a step: CMU 02_03 needs 0.26, SNU 0.83
-_MAX_LOWERING = 0.3
+_FLIGHT_SHARES = 0.5, 0.6
+_STEP_SHARES = 1.0, 1.0  # of `stepping`: a double support takes the place of each flight, and is as long
+# [m] height up to which a swinging foot of shortened steps keeps its clearance: lower than 6 mm it would bear load
+_KEPT_CLEARANCE = 0.01
+# [m] largest lowering of the root; a longer leap cannot become a step: prepared runs need up to 0.24, a run whose leaps
+# are 1 m longer 0.32
+_MAX_LOWERING = 0.35
 
 
 def grounded(
-    rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array
-) -> Array | None:
+    rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array,
+    shares: tuple[float, float] = _FLIGHT_SHARES,
+) -> Array | None:  # fmt: skip
     """Rows of a led clip (`led`) without its flight phases; None if it has none, hops on one foot, or leaps too far.
 
     Parameters
@@ -48,9 +54,11 @@ def grounded(
         Which limbs are in stance.
     sway : Array, shape (m, 2)
         Displacement of the root over the floor [m], at m equal steps of the lap.
+    shares : (float, float)
+        σ₋, σ₊.
     """
     flights = runs(~np.any(standing, axis=1))
-    warps = [_phase_warp(standing, j, flights) for j in range(len(limbs))]
+    warps = [_phase_warp(standing, j, flights, shares) for j in range(len(limbs))]
     if not flights or any(warp is None for warp in warps):
         return None
     n, result = len(rows), rows.copy()
@@ -82,14 +90,36 @@ def grounded(
     return result
 
 
+def stepping(
+    rows: Array, signs: Array, stride: float, limbs: Sequence[Limb], standing: Mask, sway: Array, longest: float
+) -> tuple[Array, float] | None:
+    """Rows of a clip with flight phases that steps instead, and the length of a lap [m]; None as `grounded`.
+
+    Steps longer than `longest` [m] are shortened to it: the root's advance and, above `_KEPT_CLEARANCE`, the height of
+    swinging feet in proportion, or a foot that kicks up behind would fold the leg under a root that is lower.
+    """
+    if not standing.any(axis=0).all():
+        return None
+    steps = min(stride, longest * len(runs(~np.any(standing, axis=1))))
+    ratio, first, result = steps / stride, rows.shape[1] - N_END_CHANNELS * len(limbs), rows.copy()
+    result[:, 0] *= ratio
+    for j, limb in enumerate(limbs):
+        column, height = 3 + 4 * limb.joints[2], first + N_END_CHANNELS * j + 2
+        soles = rows[:, height] + lowest_point(rows[:, column : column + 4], limb, SOFTMIN_WIDTH)
+        raised = np.maximum(soles - np.median(soles[standing[:, j]]), 0.0)
+        result[:, height] -= (1.0 - ratio) * (raised + _KEPT_CLEARANCE * np.expm1(-raised / _KEPT_CLEARANCE))
+    low = grounded(result, signs, steps, limbs, standing, sway, _STEP_SHARES)
+    return None if low is None else (solve_reach(low, steps, limbs), steps)
+
+
 def max_swing_speed_ratio(standing: Mask) -> float:
-    """Largest ψ' of limbs with the stance mask `standing` (n, limbs): ratio of a limb's swing speed to the clip's."""
+    """Largest ψ' of stepping limbs with the stances `standing` (n, limbs): their swing speed over the clip's."""
     flights, n = runs(~np.any(standing, axis=1)), len(standing)
-    warps = [_phase_warp(standing, j, flights) for j in range(standing.shape[1])]
+    warps = [_phase_warp(standing, j, flights, _STEP_SHARES) for j in range(standing.shape[1])]
     return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
 
 
-def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array | None:
+def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]], shares: tuple[float, float]) -> Array | None:
     """ψ n of limb j at the samples of the lap; None if it is never in stance, or would land before it lifts off."""
     n, own = len(standing), runs(standing[:, j])
     if not own:
@@ -98,7 +128,7 @@ def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]]) -> Array
     after = {start: end - start for start, end in flights}
     phases, clip_phases = list[float](), list[float]()
     for start, end in own:
-        phases += [start - _SHARE_BEFORE * before.get(start, 0), end + _SHARE_AFTER * after.get(end % n, 0)]
+        phases += [start - shares[1] * before.get(start, 0), end + shares[0] * after.get(end % n, 0)]
         clip_phases += [float(start), float(end)]
     if np.any(np.diff([*phases, phases[0] + n]) <= 0.0):
         return None

@@ -19,7 +19,8 @@ class Command:
     target: Annotated[Path, tyro.conf.Positional]
     """BVH file to write."""
     loop: str = "auto"
-    """How it continues: auto, open, or START:END of the cycle, in seconds from the first frame that is kept."""
+    """How it continues: auto, open, lap (the part that repeats itself best), or START:END of the cycle, in seconds from
+    the first frame that is kept."""
     mirror: bool = False
     """Continue with the mirror image of half a stride, or of START:END, as walks and runs do."""
     up: str | None = None

@@ -105,7 +105,7 @@ def _compute_sway(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) -
 
 def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
     """The same map with a sway of its flightless form that keeps the zero-moment point supported at 0.8 of its pace."""
-    if not led.sways:
+    if not led.has_grounded_form:
         return led
     sway, result, seconds = np.zeros((_LED_LAP_SAMPLES, 2)), led, gait.stride / (_LED_PACE * gait.speed)
     walker_states = np.zeros((_LED_LAP_SAMPLES + 2, 7))
@@ -119,7 +119,7 @@ def balanced_on_ground(led: Led, gait: Gait, figure: mujoco.MjModel) -> Led:
         mean = outside[0].mean(axis=0) if gait.flies else 0.0
         sway += sway_of(outside[0] - mean, laps.height, seconds, _CUTOFF)
         swaying = led.with_sway(sway)
-        if not swaying.sways:
+        if not swaying.has_grounded_form:
             # This sway would need too low a root, so the previous one is kept.
             break
         result = swaying

@@ -36,21 +36,22 @@ class PreparedClip(NamedTuple):
     feasible: bool = True
 
 
-def prepared_clips(paths: Sequence[Path], raw: bool = False) -> list[PreparedClip]:
+def prepared_clips(paths: Sequence[Path], raw: bool = False, loop: str = "auto") -> list[PreparedClip]:
     """The motions in files, prepared in parallel; files of `write_bvh`, and all files if `raw`, are used unchanged.
 
-    Prepared clips are cached under a hash of the captured poses and of the code that prepares them.
+    Prepared clips are cached under a hash of the captured poses and of the code that prepares them. `loop` is ``auto``
+    or ``lap`` (`models.mocap.preparation.looping.close_or_rest`).
 
     Raises
     ------
     ModelError
         If a file cannot be read, or contradicts itself.
     """
-    captures = [_Capture(path, load(path)) for path in paths]
+    captures = [_Capture(path, load(path), loop) for path in paths]
     missing = {} if raw else {capture.path: capture for capture in captures if capture.foreign and not capture.is_kept}
     if len(missing) > 1:
         with working(f"preparing {len(missing)} captures", sum(one.loaded.clip.duration for one in missing.values())):
-            run_in_workers([(prepared_clips, ([path],)) for path in missing])
+            run_in_workers([(prepared_clips, ([path], raw, loop)) for path in missing])
     return [capture.prepared(raw) for capture in captures]
 
 
@@ -59,6 +60,7 @@ class _Capture(NamedTuple):
 
     path: Path
     loaded: Loaded
+    loop: str
 
     @property
     def foreign(self) -> bool:
@@ -71,7 +73,7 @@ class _Capture(NamedTuple):
     @property
     def _cache_key(self) -> tuple[Array, Array]:
         clip, loops = self.loaded.clip, self.loaded.loops
-        return clip.poses, np.array([clip.fps, -1.0 if loops is None else float(loops)])
+        return clip.poses, np.array([clip.fps, -1.0 if loops is None else float(loops), float(self.loop == "lap")])
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -84,18 +86,25 @@ class _Capture(NamedTuple):
             return PreparedClip(clip, notes)
         rows = cached_array(results_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape, self._prepare)
         outcome = (
-            "prepared"
+            "prepared" + self._part(rows[0, 2:5])
             if rows[0, 1]
             else "no feasible motion is near it: looped and smoothed alone, as `hvf prepare` reports"
         )
         remarks = (*notes, f"{self.path.name}: {outcome}; --raw takes the capture as it is")
         return PreparedClip(Clip(rows[1:], float(rows[0, 0]), clip.name), remarks, bool(rows[0, 1]))
 
+    def _part(self, looped: Array) -> str:
+        if self.loop == "auto":
+            return ""
+        start, end, gap = looped
+        return f" from {start:.2f} to {end:.2f} s, the lap that repeats itself best (its ends were {gap:.0f}° apart)"
+
     def _prepare(self) -> Array:
         from models.mocap.preparation.prepare import prepared  # imported late: loads signal processing
 
         with working(f"preparing {self.path.name}"):
-            result = prepared(self.path)
+            result = prepared(self.path, self.loop)
         header = np.zeros((1, result.clip.poses.shape[1]))
-        header[0, :2] = result.clip.fps, result.near
+        looped = result.looped
+        header[0, :5] = result.clip.fps, result.near, looped.start, looped.end, np.degrees(looped.gap)
         return np.vstack((header, result.clip.poses))

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from controllers.fields.leading import Leading
-from controllers.haptic_map.led import Led
 from controllers.safety.limiter import ForceLimiter
 from controllers.walking.gait import Gait
 from controllers.walking.walking import Walking
@@ -36,9 +35,8 @@ _MAX_RUNNING_PACE = 1.0
 # A foot that is planned to bear load but is not held in place twists on the spot. A led figure may stop anywhere, so
 # its contact points are unloaded at half the height (reference_reach) at which they are released (stance_height).
 _WALKING = FigureGains(reference_reach=0.006, stance_height=0.012, lift_time=0.005, unload_time=0.005)
-# A gait with flights changes feet within a hundredth of a second, and with the low reach would stand on neither foot; a
-# gait kept on the ground takes a little longer.
-_FLYING, _STEPPING = _WALKING._replace(reference_reach=0.012), _WALKING._replace(reference_reach=0.01)
+# A gait with flights changes feet within a hundredth of a second, and with the low reach would stand on neither foot.
+_FLYING = _WALKING._replace(reference_reach=0.012)
 
 
 def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
@@ -57,7 +55,7 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
 
     return Parts(
         config=config, maps=maps, field=field, program=field.program(), course=course, user=_make_hand(config, field),
-        tank=tank, notes=notes, gains=_gains(maps.haptic_map), walking=field.walking,
+        tank=tank, notes=notes, gains=_FLYING if maps.haptic_map.flies else _WALKING, walking=field.walking,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
     )  # fmt: skip
 
@@ -77,11 +75,6 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     running = {"forward": _MAX_RUNNING_PACE} if gait.flies or gait.grounded else {}
     walking = Walking(gait, (float(x), float(y)), -HALF_TURN, scale, **flying, **running)
     return Leading(walking, k_l=mode.leash, b=mode.damping)
-
-
-def _gains(led: Led) -> FigureGains:
-    """Gains of a led physical figure, by whether its gait flies, is kept on the ground, or walks."""
-    return _FLYING if led.flies else _STEPPING if led.has_grounded_form else _WALKING
 
 
 def _make_hand(config: RunConfig, field: Leading) -> Arm | Participant:

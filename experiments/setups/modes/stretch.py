@@ -21,7 +21,6 @@ from experiments.setups.modes.fixed_curve import with_walls
 from experiments.setups.modes.lifted_runs import HELD_GAINS
 from experiments.setups.parts import hands
 from experiments.setups.parts.budget import WORKSPACE_WIDTH, fastest, tank_for
-from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION
 from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
@@ -40,6 +39,9 @@ _MIN_BUMP, _BUMP_SHARE = 0.5, 0.125  # default half width of a bend: that of a l
 PRESS_RATIO = 2.2
 EASE_TIME = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
 _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
+_MIN_FLIGHT_DURATION = (
+    0.05  # [s] shortest flight of a clip that counts: half or twice the value changes none of eight captures
+)
 
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:
@@ -145,7 +147,7 @@ def flight_remarks(clips: tuple[Clip, ...], figure: FigureKind) -> tuple[str, ..
     over: list[str] = []
     for clip in clips:
         air = ~contacts(clip).supported
-        if max((end - start for start, end in spans(air)), default=0) <= MIN_CLIP_FLIGHT_DURATION * clip.fps:
+        if max((end - start for start, end in spans(air)), default=0) <= _MIN_FLIGHT_DURATION * clip.fps:
             continue
         flying.append(clip.name)
         # The vertical component of the root's z axis, 1 − 2 (x² + y²), is negative: upside down.

@@ -8,11 +8,8 @@ from models.errors import ModelError
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 
-MIN_CLIP_FLIGHT_DURATION = 0.05
-"""Shortest flight of a clip that counts [s]: half or twice this value changes none of eight captures that are led."""
 
-
-def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
+def load_clips(names: Sequence[str], raw: bool = False, loop: str = "auto") -> tuple[tuple[Clip, ...], tuple[str, ...]]:
     """Load clips by name or file; returns them and remarks about them.
 
     Parameters
@@ -21,6 +18,8 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
         Names of embedded clips, or paths of motion files.
     raw : bool
         Take motion files as captured; otherwise they are prepared, once for each content (`prepared_clips`).
+    loop : str
+        How they are prepared: ``auto``, or ``lap``.
 
     Raises
     ------
@@ -30,6 +29,6 @@ def load_clips(names: Sequence[str], raw: bool = False) -> tuple[tuple[Clip, ...
     for name in names:
         if name not in embedded_names() and not Path(name).suffix:
             raise ModelError(f"no embedded clip {name!r}; there are {', '.join(embedded_names())}, or give a file")
-    files = iter(prepared_clips([Path(name) for name in names if name not in embedded_names()], raw))
+    files = iter(prepared_clips([Path(name) for name in names if name not in embedded_names()], raw, loop))
     clips = [PreparedClip(embedded(name), ()) if name in embedded_names() else next(files) for name in names]
     return tuple(each.clip for each in clips), tuple(remark for each in clips for remark in each.remarks)

@@ -8,25 +8,27 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
-from controllers.legs.cyclic_runs import runs
 from controllers.legs.limbs import Limb
-from controllers.motion.captures import Capture
 from controllers.walking.gait import Gait
 from experiments.config.maps import Led as LedMap
 from experiments.config.run_config import RunConfig
 from experiments.fitting.balance import balanced_on_ground, imbalance_at_rest
 from experiments.fitting.figure_legs import figure_legs
-from experiments.setups.parts.clips import MIN_CLIP_FLIGHT_DURATION, load_clips
+from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
 from geometry.arrays import Mask
-from models.humanoid.skeleton import CONTACT_RADIUS, proportion
-from models.mocap.dynamics.contacts import Contacts, contacts
+from models.humanoid.skeleton import proportion
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded_names
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import best_lap
+from models.mocap.preparation.looping import close_or_rest
 from sim.world.world import FigureKind
+
+MAX_STEP = 0.75
+"""Longest step of a capture that is led without its flight phases [m]."""
 
 _PHASE_COUNT = 256  # samples of the stance over a lap: one in 4 ms for a lap of a second
 # Difference of the end poses above which a clip is not a cycle: CMU 02_01's lap has 5°, its whole clip 35°.
@@ -37,7 +39,6 @@ _MAX_IMBALANCE = 2e-3
 # Share of its lap, at less than a quarter of its mean speed [1] over 0.1 s [s], above which a clip is no steady gait:
 # gaits among 143 prepared captures have 0.11 at most; those that jump, stop or look round have 0.14 to 0.97.
 _MAX_SLOW_SHARE, _SLOW_SPEED, _SPEED_TIME = 0.2, 0.25, 0.1
-_MIN_SWING_TIME = 0.15  # [s] shortest swing phase or hop: half or twice of it changes none of these captures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +73,7 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
 
 
 def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
-    """The clip that is led, and remarks about it: prepared, or as captured if the prepared one has flights.
-
-    The flights of a prepared run are ballistic at the run's own pace only; a led figure moves at other paces and would
-    land early or late. A clip as captured is led by steps (`gait_remark`). Embedded clips are the same either way.
+    """The clip that is led, and remarks about it: of a file in which no cycle is found, the best lap is prepared.
 
     Raises
     ------
@@ -83,13 +81,12 @@ def led_clips(part: LedMap) -> tuple[tuple[Clip, ...], tuple[str, ...]]:
         If there is no such clip, or a file cannot be read.
     """
     clips, remarks = load_clips(part.clips, part.raw)
-    if part.raw or all(contacts(clip).planted.any(axis=1).all() for clip in clips):
+    if part.raw:
+        slides = "led as captured: its feet slide, and the physical figure may fall; without --raw it is prepared"
+        return clips, (*remarks, *(f"{name}: {slides}" for name in part.clips if name not in embedded_names()))
+    if all(clip.closes(CLOSURE_TOLERANCE) for clip in clips):
         return clips, remarks
-    captured, remarks_captured = load_clips(part.clips, raw=True)
-    if all(np.array_equal(clip.poses, raw.poses) for clip, raw in zip(clips, captured, strict=True)):
-        return clips, remarks
-    names = ", ".join(clip.name for clip in captured)
-    return captured, (*remarks_captured, f"{names}: flies when prepared, and is led as captured, by steps")
+    return load_clips(part.clips, loop="lap")
 
 
 def is_authored(config: RunConfig) -> bool:
@@ -100,26 +97,21 @@ def is_authored(config: RunConfig) -> bool:
 def led_map(clip: Clip, figure: mujoco.MjModel, authored: bool = True) -> tuple[Led, Gait]:
     """Map and gait of a led figure, beginning in the middle of the longest stance with the most feet on the floor.
 
-    A clip that closes is taken as feasible and led as it is. A clip that does not close is led as a capture, with its
-    stance feet held (`Capture`); so is a clip with flights that is not authored, or for which no other form without
-    flights exists. A figure of another stature moves in proportion, with strides of its size.
+    A clip is led as it is, but one with flights that is not authored, or for which no other form without flights
+    exists, by steps; one that does not close is closed first. A figure of another stature moves in proportion, with
+    strides of its size.
 
     Raises
     ------
     ParameterError
         If the clip does not travel, or has no frame in which a foot stands.
     """
-    lap, closes = best_lap(clip), clip.closes(CLOSURE_TOLERANCE)
-    marks = contacts(clip).within(round(lap.start * clip.fps), lap.clip.n_frames)
-    size, legs = proportion(figure), figure_legs(figure)
-    clip, capture = lap.clip.resized(size), Capture(CONTACT_RADIUS * size)
-    if not closes:
-        return _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
-    as_recorded = _map_and_gait(clip, legs, marks.planted[:-1], None)
-    if as_recorded[0].flies and not (authored and as_recorded[0].has_grounded_form):
-        steps = _map_and_gait(clip, legs, stances(marks, clip.fps), capture)
-        return steps if steps[0].has_grounded_form else as_recorded
-    return as_recorded
+    cycle = clip if clip.closes(CLOSURE_TOLERANCE) else close_or_rest(clip, "lap").clip
+    clip, legs, stance = cycle.resized(proportion(figure)), figure_legs(figure), contacts(cycle).planted[:-1]
+    as_recorded = _map_and_gait(clip, legs, stance)
+    if not as_recorded[0].flies or (authored and as_recorded[0].has_grounded_form):
+        return as_recorded
+    return _map_and_gait(clip, legs, stance, MAX_STEP)
 
 
 def _begun_in_balance(led: Led, figure: mujoco.MjModel) -> Led:
@@ -135,7 +127,9 @@ def _begun_in_balance(led: Led, figure: mujoco.MjModel) -> Led:
     return led.begun_at((led.phase + later / _PHASE_COUNT) % 1.0)
 
 
-def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stance: Mask, capture: Capture | None) -> tuple[Led, Gait]:
+def _map_and_gait(
+    clip: Clip, legs: tuple[Limb, ...], stance: Mask, longest_step: float | None = None
+) -> tuple[Led, Gait]:
     """Map and gait of one lap; `stance` marks the feet on the floor in each of its frames but the last."""
     phases, steps = np.linspace(0.0, 1.0, _PHASE_COUNT, endpoint=False), clip.n_frames - 1
     sampled = stance[np.round(phases * steps).astype(int) % steps]
@@ -143,7 +137,7 @@ def _map_and_gait(clip: Clip, legs: tuple[Limb, ...], stance: Mask, capture: Cap
     if not support.any():
         raise ParameterError(f"clip {clip.name!r} has no frame in which a foot stands; expected one that goes on foot")
     first = _middle_of_longest(support == support.max())
-    led = Led((clip.poses, clip.fps), legs, phases[first], sampled if capture is None else stance, capture)
+    led = Led((clip.poses, clip.fps), legs, phases[first], sampled, longest_step)
     if not led.flies:
         support = np.maximum(support, 1)
     speed, grounded = led.pace * led.stride / led.duration, led.has_grounded_form and not led.flies
@@ -180,37 +174,13 @@ def _slow_share(lap: Clip) -> float:
     return float(np.mean(speed < _SLOW_SPEED * advance[-1]))
 
 
-def stances(marks: Contacts, fps: float) -> Mask:
-    """Stance of each foot of a capture, shape (n − 1, 2), for n frames of which the last begins the next lap.
-
-    Contact marks are cleaned in three steps. A foot that is up for less than `_MIN_SWING_TIME` stands throughout. Where
-    no foot is settled, a foot that was in stance and is still planted stays in stance: it has not left the floor, but
-    sunk into it. A flight shorter than `MIN_CLIP_FLIGHT_DURATION` is ignored: feet in stance before it stay in stance.
-    """
-    stance, rests = marks.settled[:-1], marks.planted[:-1]
-    n = len(stance)
-    for foot in range(stance.shape[1]):
-        for start, end in runs(~stance[:, foot]):
-            if end - start < _MIN_SWING_TIME * fps:
-                stance[np.arange(start, end) % n, foot] = True
-    for start, end in runs(~np.any(stance, axis=1)):
-        for sample in range(start, end):
-            stance[sample % n] = stance[sample % n - 1] & rests[sample % n]
-            if not stance[sample % n].any():
-                break
-    for start, end in runs(~np.any(stance, axis=1)):
-        if end - start < MIN_CLIP_FLIGHT_DURATION * fps:
-            stance[np.arange(start, end) % n] = stance[start - 1]
-    return stance
-
-
 def gait_remark(name: str, led: Led, figure: FigureKind) -> tuple[str, ...]:
     """Remark on a clip with flights: a body in the air falls with g, whatever the pace at which it is led."""
     if led.flies and led.has_grounded_form:
         return (f"the clip {name!r} flies: led slowly it goes without flights, on bent knees",)
     if led.has_grounded_form:
         return (
-            f"the clip {name!r} flies: a capture is led without flights, by steps of {Capture.step} m at most, at "
+            f"the clip {name!r} flies: a capture is led without flights, by steps of {MAX_STEP} m at most, at "
             f"{led.pace * led.stride / led.duration:.1f} m/s",
         )
     if led.flies and figure == "physical":

@@ -17,7 +17,7 @@ import numpy as np
 from geometry.arrays import Array, Mask
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
-from models.mocap.motion.spans import cleaned, spans
+from models.mocap.motion.spans import cleaned
 
 # Height below which a part touches at any speed [m]. Half or twice the value changes whether the body is supported in
 # 0.8 % of the frames of 17 captures.
@@ -31,17 +31,13 @@ _MAX_HAND_SPEED = 0.6
 # Height [m] and speed [m/s] below which heel or toes stand. Chosen on eight captures with a prototype: ±1 cm and
 # ±0.1 m/s change the residual of the prepared motions by less than 1 percentage point.
 _MAX_STANCE_HEIGHT, _MAX_STANCE_SPEED = 0.045, 0.55
-# Fraction of the root's speed below which they stand, too, but do not rest. If they rested, SNU's run in leading would
-# have a residual of 15 % of body weight instead of 8 %, and the embedded run's soles would slide by 3.8 cm instead of
-# 2.4 cm.
+# Fraction of the root's speed below which they stand, too, but do not rest. If they rested, the soles of the embedded
+# run that is led would slide by 3.8 cm instead of 2.4 cm.
 _ROOT_SPEED_FRACTION = 0.3
 # Half or twice any of the next four values changes whether a sphere stands in at most 0.9 % of the frames of 19
 # captures (in one capture 9 %, if stances of up to 0.12 s are dropped).
 _MAX_TOE_HEIGHT, _MAX_TOE_SPEED = 0.10, 0.15  # [m], [m/s]: of toes that stand beside a standing heel
 MAX_FILLED_GAP, MIN_STANCE_TIME = 0.05, 0.06  # gaps shorter than this are filled, stances shorter than this dropped [s]
-# Largest height of a settled foot above the median of its stance [m]. Half or twice the value changes the slide of feet
-# in leading by 0.7 cm.
-_MAX_SETTLED_RISE = 0.005
 # A part below this height [m] and vertical speed [m/s] slides over the floor. Half the height changes whether the body
 # is supported in 1.2 % of these frames, twice the height in 0.2 %; half or twice the speed in 0.6 %.
 _MAX_SLIDING_HEIGHT, _MAX_VERTICAL_SPEED = 0.03, 0.25
@@ -64,11 +60,6 @@ class Contacts(NamedTuple):
     touching: Mask
     resting: Mask
 
-    def within(self, first: int, count: int) -> "Contacts":
-        """The contacts of `count` frames from frame `first` on; stances that began before it are kept."""
-        frames = slice(first, first + count)
-        return Contacts(self.heights[frames], self.touching[frames], self.resting[frames])
-
     @property
     def clearance(self) -> Array:
         """Height of the lowest point of the body [m], shape (n,)."""
@@ -88,17 +79,6 @@ class Contacts(NamedTuple):
     def planted(self) -> Mask:
         """Whether each foot stands at rest, left and right, shape (n, 2)."""
         return np.stack([self.resting[:, :4].any(axis=1), self.resting[:, 4:8].any(axis=1)], axis=1)
-
-    @property
-    def settled(self) -> Mask:
-        """Whether each foot stands at rest and near the median height of its stance, left and right, shape (n, 2)."""
-        settled = self.planted
-        for foot, stance in enumerate(settled.T):
-            lowest = self.heights[:, 4 * foot : 4 * foot + 4].min(axis=1)
-            for start, end in spans(stance):
-                level = float(np.median(lowest[start:end]))
-                settled[start:end, foot] = lowest[start:end] < level + _MAX_SETTLED_RISE
-        return settled
 
 
 def contacts(clip: Clip) -> Contacts:

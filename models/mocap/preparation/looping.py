@@ -114,7 +114,8 @@ def close_or_rest(
     clip : Clip
         A capture.
     wish : str
-        ``auto``, ``open``, or the start and end of the cycle in seconds, such as ``1.2:2.4``.
+        ``auto``, ``open``, ``lap`` (the part that repeats itself best, however well it does), or the start and end of
+        the cycle in seconds, such as ``1.2:2.4``.
     wraps : bool or None
         Whether the file declares itself to be cyclic; None if it says nothing.
     mirror : bool
@@ -136,6 +137,9 @@ def close_or_rest(
         return _close(clip, *half, half=True)
     if clip.n_frames < 8 or wish == "open":
         return _bring_to_rest(clip, ending)
+    if wish == "lap":
+        lap = best_lap(clip)
+        return _close(clip, round(lap.start * clip.fps), round(lap.end * clip.fps), lap.gap)
     if wish != "auto":
         start, end = _requested_frames(clip, wish)
         return _close(clip, start, end, float(_distances(clip, np.array([start, end]))[0, 1]))
@@ -159,7 +163,7 @@ def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
     try:
         start, end = (float(part) for part in wish.split(":"))
     except ValueError:
-        raise ModelError(f"--loop {wish!r}; expected auto, open, or START:END in seconds") from None
+        raise ModelError(f"--loop {wish!r}; expected auto, open, lap, or START:END in seconds") from None
     half_frame = 0.5 / clip.fps
     if not (0.0 <= start <= end - _MIN_STATED_TIME + half_frame and end <= clip.duration + half_frame):
         raise ModelError(

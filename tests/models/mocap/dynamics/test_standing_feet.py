@@ -110,6 +110,3 @@ def test_stance_continues_across_the_ends_of_a_lap_and_the_seam_of_a_closed_clip
     planted = contacts(moved).planted[:-1, 0]
     assert planted[-3:].all()
     np.testing.assert_array_equal(planted[10:-10], whole.planted[turned, 0][10:-10])
-    part = contacts(walk).within(lands, 4)
-    assert part.planted[:, 0].all()
-    assert part.planted.shape == (4, 2)
