@@ -81,8 +81,8 @@ def trial_key(config: RunConfig) -> str:
     StudyError
         If a file that it names does not exist.
     """
+    files = [f"{name} {file_digest(name)}" for name in files_of(config)]  # first: they may decide on the lap
     text = to_json(resolved(config))
-    files = [f"{name} {file_digest(name)}" for name in files_of(config)]
     return hashlib.sha256("\n".join([code_hash(), text, *files]).encode()).hexdigest()[:32]
 
 
