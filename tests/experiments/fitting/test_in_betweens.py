@@ -10,6 +10,7 @@ from controllers.motion.lap import MEMORY
 from experiments.config.maps import Cylindrical
 from experiments.config.options import run_config
 from experiments.setups.parts.clips import load_clips
+from experiments.setups.parts.lap import DEFAULT_LAP
 from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.floor_forces import Floor, residual
@@ -99,7 +100,7 @@ def test_composite_feet_follow_the_lower_clip_without_sliding(clips):
 # The walk's legs carry the arms of the other three: a mean of all at its pace would lack up to 0.14, 0.04 on average.
 @pytest.mark.parametrize(("clips", "max_share", "mean_share"), [(FIGURE_CLIPS, 0.04, 0.025), (STANDING, 0.055, 0.03)])
 def test_floor_can_provide_the_forces_of_in_betweens(clips, max_share, mean_share):
-    floor, step, shares = Floor(), CONFIG.map.around.lap / ROWS, []
+    floor, step, shares = Floor(), DEFAULT_LAP / ROWS, []
     for r, z in MIXTURES:
         poses = laps(map_of(clips), r, z, count=1.0 + 4 / ROWS)
         change = pose_difference(poses[:-1], poses[1:]) / step
