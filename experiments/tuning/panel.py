@@ -8,6 +8,7 @@ import numpy as np
 
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig, User
+from experiments.setups.parts.lap import with_lap
 from experiments.trials.design.plan import trial_key
 from experiments.trials.design.study_config import StudyError, Users
 from experiments.trials.execution.database import Database
@@ -21,6 +22,7 @@ from sim.users.person.population import population
 def panel_runs(config: TuneConfig, candidate: RunConfig, users: Users) -> list[list[RunConfig]]:
     """Runs of a candidate by user; all candidates have the same seeds, so that only their values differ."""
     runs: list[list[RunConfig]] = []
+    candidate = replace(candidate, map=with_lap(candidate.map))  # once, for motion files are read for it
     for number, person in enumerate(population(users.number, users.seed)):
         user_runs: list[RunConfig] = []
         for k, task in enumerate(config.tasks or (users.does,)):
