@@ -33,7 +33,7 @@ from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from geometry.quaternions import about_axis, product, with_continuous_signs
 
-CATCH_UP = 8.0
+_CATCH_UP = 8.0
 """Least κ ∫ g over a lap, after which e⁻⁸ of a gap is left. Half or twice this value changes the foot slide of blends
 and of led captures by at most 0.1 mm."""
 
@@ -191,7 +191,7 @@ def _mixture_corrections(channels: Array, drifts: Array, limbs: Sequence[Limb], 
     # A foot that the clips do not lift follows the mean.
     hold = smooth_steps(highest / _FULL_HOLD_LIFT)
     free = 1.0 - hold * (1.0 - free)
-    rate = np.maximum(CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
+    rate = np.maximum(_CATCH_UP / np.maximum(free.mean(axis=0), 0.02), 60.0)
     slips = (1.0 - free)[..., None] * feet.moves
     ahead = accumulated_slip(slips, np.exp(-rate * free / n), (weights @ drifts)[:, 2, None])
     result = np.zeros((n, len(weights), ROOT + FOOT * len(limbs)))

@@ -25,7 +25,7 @@ def extension(rows: Array, stride: float, limb: Limb, at: int) -> float:
     return float(np.linalg.norm(_limb_vector(rows, stride, limb, at), axis=1).max())
 
 
-def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float = 0.0) -> Array:
+def shortfall(rows: Array, stride: float, limb: Limb, at: int, longest: float) -> Array:
     """Lowering of the root that a limb needs to reach its end [m], shape (n,).
 
     Parameters

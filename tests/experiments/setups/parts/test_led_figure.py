@@ -1,4 +1,4 @@
-"""Stances of a capture: least durations of swings and flights, feet that sink or lift briefly; where a run begins."""
+"""Where a led figure begins, which clips it leads by steps, and which are said to be no steady gait."""
 
 import re
 
@@ -11,62 +11,11 @@ from controllers.haptic_map.led import Led
 from experiments.certify.certified_leading import leading_field
 from experiments.config.modes import Lead
 from experiments.config.options import run_config
-from experiments.setups.parts.led_figure import lap_remark, led_parts, stances
+from experiments.setups.parts.led_figure import lap_remark, led_parts
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.dynamics.contacts import Contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.reference.reference import map_poses
-
-FPS, FRAMES = 100.0, 101
-FEET = {"left": np.arange(4), "right": np.arange(4, 8)}
-
-
-def marks(*rests: tuple[str, float, float, float]) -> Contacts:
-    """Contacts of a lap of 1 s from (foot, start, end, height) of rests; otherwise feet are 0.2 m high."""
-    heights, resting = np.full((FRAMES, 10), 0.2), np.zeros((FRAMES, 10), dtype=bool)
-    t = np.arange(FRAMES) / FPS
-    for foot, start, end, height in rests:
-        during = np.ix_((t > start - 1e-9) & (t < end - 1e-9), FEET[foot])
-        heights[during], resting[during] = height, True
-    return Contacts(heights, resting.copy(), resting)
-
-
-def test_stances_of_a_walk_are_unchanged() -> None:
-    stands = stances(marks(("left", 0.0, 0.6, 0.0), ("right", 0.5, 1.0, 0.0)), FPS)
-    assert stands.shape == (FRAMES - 1, 2)
-    np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(60))
-    np.testing.assert_array_equal(np.flatnonzero(stands[:, 1]), np.arange(50, 100))
-
-
-@pytest.mark.parametrize("gap", [0.02, 0.12])
-def test_brief_lift_of_a_foot_counts_as_stance(gap: float) -> None:
-    # On one foot alone, and beside the other.
-    walk = (("left", 0.0, 0.2, 0.0), ("left", 0.2 + gap, 0.6, 0.0), ("right", 0.1, 0.7, 0.0))
-    both = stances(marks(*walk), FPS)
-    np.testing.assert_array_equal(np.flatnonzero(both[:, 0]), np.arange(60))
-    alone = stances(marks(*walk[:2]), FPS)
-    np.testing.assert_array_equal(np.flatnonzero(alone[:, 0]), np.arange(60))
-
-
-def test_hops_and_runs_have_flights_and_brief_gaps_have_none() -> None:
-    hops = stances(marks(("left", 0.0, 0.3, 0.0), ("left", 0.5, 0.8, 0.0)), FPS)
-    assert not hops[30:50].any()
-    runs = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.4, 0.9, 0.0)), FPS)
-    assert not runs[30:40].any()
-    assert not runs[90:].any()
-    # A gap of 30 ms between the feet is not a flight.
-    walks = stances(marks(("left", 0.0, 0.3, 0.0), ("right", 0.33, 1.0, 0.0)), FPS)
-    assert walks.any(axis=1).all()
-    np.testing.assert_array_equal(np.flatnonzero(walks[:, 0]), np.arange(33))
-
-
-def test_sinking_heel_causes_no_flight() -> None:
-    # 3 cm below the floor for most of its stance, then on it, when the other has not landed yet.
-    feet = (("left", 0.0, 0.4, -0.03), ("left", 0.4, 0.55, 0.0), ("right", 0.52, 1.0, 0.0))
-    stands = stances(marks(*feet), FPS)
-    assert stands.any(axis=1).all()
-    np.testing.assert_array_equal(np.flatnonzero(stands[:, 0]), np.arange(52))
 
 
 def distance_from_support(led: Led) -> float:
