@@ -10,6 +10,7 @@ from experiments.setups.parts.clips import load_clips
 from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import prepare
+from models.mocap.preparation.looping import LoopedClip
 from models.mocap.readers.own_bvh import write_bvh
 from tests.models.mocap.retargeting.rigs import Rig, random_rig, write_rig
 
@@ -27,9 +28,10 @@ def calls(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Path]:
     found: list[Path] = []
 
     class QuickPreparation:
-        def __init__(self, path: Path):
+        def __init__(self, path: Path, loop: str = "auto"):
             found.append(path)
             loaded = load(path).clip
+            self.looped = LoopedClip(loaded, "cycle", 0.25, 1.5, 0.1)
             self.near = path.stem != "cartwheel"
             self.clip = Clip(loaded.poses[::2], loaded.fps / 2.0, loaded.name)
 
@@ -46,6 +48,14 @@ def test_foreign_file_is_prepared_once_and_cached_exactly(foreign: Path, calls: 
     np.testing.assert_array_equal(first.poses, again.poses)
     assert first.fps == again.fps == load(foreign).clip.fps / 2.0
     assert any("--raw" in remark for remark in remarks)
+
+
+def test_best_lap_is_prepared_and_cached_apart(foreign: Path, calls: list[Path]) -> None:
+    load_clips([str(foreign)])
+    for _ in range(2):
+        _, remarks = load_clips([str(foreign)], loop="lap")
+        assert "prepared from 0.25 to 1.50 s, the lap that repeats itself best (its ends were 6° apart)" in remarks[-1]
+    assert len(calls) == 2
 
 
 def test_capture_without_near_feasible_motion_is_reported(foreign: Path, calls: list[Path]) -> None:
