@@ -97,7 +97,7 @@ def test_seed_and_versions_are_shown(write):
 
 
 def test_remarks_before_a_run_are_in_its_summary_and_on_its_page(tmp_path, capsys) -> None:
-    hvf.run(user="turn", figure="none", seconds=0.1, record=tmp_path / "turned")
+    hvf.run(user="turn", figure="none", seconds=1.5, record=tmp_path / "turned")
     (remark,) = json.loads((tmp_path / "turned" / "summary.json").read_text())["remarks"]
     assert "ignores its orientation" in remark
     assert remark in Page((tmp_path / "turned" / "report.html").read_text()).texts
