@@ -179,7 +179,8 @@ def _differs_over_the_floor_alone(first: Array, last: Array, turn: float) -> boo
     before, after = first[3:].reshape(-1, 4).copy(), last[3:].reshape(-1, 4)
     before[0] = product(about_axis(2, np.array(turn)), before[0])
     gaps = np.minimum(np.abs(after - before).max(axis=1), np.abs(after + before).max(axis=1))
-    return bool(max(abs(last[2] - first[2]), gaps.max()) < MAX_CLOSURE_GAP)
+    moved = max(abs(turn), float(np.hypot(*(last[:2] - first[:2]))))
+    return moved > MAX_CLOSURE_GAP and bool(max(abs(last[2] - first[2]), gaps.max()) < MAX_CLOSURE_GAP)
 
 
 def periodic_remainder(poses: Array, s: Array, drift: Array) -> Array:
