@@ -1,12 +1,12 @@
 """The circle of a map: its lap is as configured, or else one that suits the map's clips."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from experiments.config.maps import Composite, Cylindrical, Led, Map, MapFile, RiverClips, RobotArm
-from models.mocap.library import embedded_names
 
 DEFAULT_LAP = 4.0
 """Duration of a lap [s] about a map's circle that plays embedded clips only, or none."""
@@ -63,7 +63,7 @@ def circle_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -
 def _lap_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -> float:
     if part.around.lap is not None:
         return part.around.lap
-    if set(part.clips) <= set(embedded_names()):
+    if not any(Path(name).suffix for name in part.clips):  # embedded clips have names without
         return DEFAULT_LAP
     # Imported late: they load splines, which a check of gains does not need.
     from experiments.fitting.blendable import best_lap, timing_clip
