@@ -32,30 +32,28 @@ from geometry.easing import cubic_steps
 N_ROWS = 64  # control points round the lap
 _SAMPLES_PER_ROW = 3
 N_ANGLES = N_ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
-# The sensitivities of the constants in this folder were found with walk, run, jump and backflip, in a room with r from
-# 20 mm on, and an optimiser that stopped before it had converged. Distances of two clips are those of their curves at
-# the transition.
+# Sensitivities of the constants in this file are for walk, run, jump and backflip. Walk and run pass within 7.7 mm of
+# each other, jump and backflip within 4.4 mm; h_* changes by at most 74 % of itself per millimetre at nine of ten
+# places. Those in other files of this folder were found in a room with r from 20 mm on, before arrangements converged.
 
-# [rad] distance from a transition within which two curves may be nearer than the separation. With half of it walk and
-# run come within 12.7 mm instead of 10.1, jump and backflip within 8.7 instead of 5.0.
+# [rad] distance from a transition within which two curves may be nearer than the separation. With half of it the
+# distances are 9.7 and 8.4 mm, with twice 6.2 and 2.6.
 TRANSITION_WINDOW = 0.9
-# Target distance of the most different motions, as a fraction of the rectangle's diagonal. With 0.6 walk and run come
-# within 5.6 mm of each other, with 0.8 within 10.1, with 1.0 within 12.9; h_* changes by 11, 12 and 10 % per
-# millimetre.
+# Target distance of the most different motions, as a fraction of the rectangle's diagonal. With 0.6 the distances are
+# 6.0 and 4.0 mm and h_* changes by 77 %, with 1.0 9.5 and 4.9 mm and 62 %.
 _FILL_FRACTION = 0.8
-# Least distance at a transition, as a fraction of the target distance κ d of the poses. Walk and run come within 10.1
-# mm, with half of it 7.4 and with twice 15.1; at nine of ten places h_* changes by at most 66, 69 and 55 % per
-# millimetre.
+# Least distance at a transition, as a fraction of the target distance κ d of the poses. With half of it walk and run
+# pass within 5.9 mm and h_* changes by 74 %, with twice 12.7 mm and 63 %.
 _MIN_DISTANCE_RATIO = 0.2
-# Weights of the terms. Half or twice the separation weight changes the distances at the transitions (5.0 and 10.1 mm)
-# by 0.2 mm, the tangent weight by 0.4, the approach and bend weights by 1.8; the condition number of h_* half way
-# between two curves changes by 0.6 of 22.7.
+# Weights of the terms. Half or twice the separation and limit weights leave the distances unchanged, the tangent weight
+# changes them by 0.3 mm, the bend weight by 0.4, the approach weight by 0.6. The median condition number of h_* half
+# way between two curves, 26.8, changes by 0.7, with the bend weight by 3.9.
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
 # [rad/s] ω: a captured walk with a residual of 1.7 % of weight has 4.7 % on its curve, with ω = 3 rad/s 11 %
 _BEND_RATE = 2.0
 _LENGTH_UNIT = 0.02  # [m] unit of length of slopes and bends in the energy
-# Safety factor on the separation and the limits, for angles between the samples. Curves come within 5.0 mm of each
-# other, with 1.0 within 4.5 and with 1.2 within 5.6.
+# Safety factor on the separation and the limits, for angles between the samples. Curves come within 4.4 mm of each
+# other, with 1.0 within 4.0 and with 1.2 within 4.8.
 _SAFETY_FACTOR = 1.1
 
 
