@@ -222,13 +222,15 @@ def pareto_front(candidates: Sequence[Candidate], directions: Sequence[str]) -> 
 def best_candidate(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
     """The best candidate for one objective; for several, the candidate on the front nearest to the ideal point.
 
-    Objectives are scaled to their range on the front. None if no candidate was tried.
+    Objectives are scaled to their range over all candidates that were tried: by the range on the front, the two ends of
+    a front of two would always be equally near. None if no candidate was tried.
     """
-    best = pareto_front(candidates, directions)
-    if not best:
+    signs, tried = signs_of(directions), [c.objectives for c in candidates if c.objectives is not None]
+    if not tried:
         return None
-    signs = signs_of(directions)
-    costs = np.array([signs * np.array(c.objectives) for c in best])
-    low, span = costs.min(axis=0), np.ptp(costs, axis=0)
-    scaled = (costs - low) / np.where(span > 0.0, span, 1.0)
-    return best[int(np.argmin(np.linalg.norm(scaled, axis=1)))]
+    low, span = (signs * np.array(tried)).min(axis=0), np.ptp(tried, axis=0)
+
+    def distance(candidate: Candidate) -> float:
+        return float(np.linalg.norm((signs * np.array(candidate.objectives) - low) / np.where(span > 0.0, span, 1.0)))
+
+    return min(pareto_front(candidates, directions), key=distance)

@@ -176,6 +176,16 @@ def test_pareto_front_and_its_middle_choice() -> None:
     assert [c.objectives for c in pareto_front(found, ["minimize", "maximize"])] == [(1.0, 9.0)]
 
 
+def test_of_a_front_of_two_the_one_that_loses_less_of_the_range_is_chosen() -> None:
+    # The second gives up a quarter of one range, the first most of the other.
+    places = [(1.0, 5.0), (3.0, 9.0), (9.0, 4.0)]
+    found = [Candidate({"k": float(i)}, place, "certified", 1.0, "tried") for i, place in enumerate(places)]
+    for order in (found, found[::-1]):
+        best = best_candidate(order, ["minimize", "maximize"])
+        assert best is not None
+        assert best.objectives == (3.0, 9.0)
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
