@@ -118,7 +118,7 @@ def tuning_page(
         contenders=_contenders(config, judged, comparisons),
         importances=_importances(importances),
         verdicts="".join(
-            f"<tr><td>{name}</td><td class=l>{html.escape(reason)}</td></tr>" for name, reason in verdicts.items()
+            f"<tr><td>{name}</td><td class=says>{html.escape(reason)}</td></tr>" for name, reason in verdicts.items()
         ),
         text=html.escape(text),
     )
@@ -127,7 +127,7 @@ def tuning_page(
 
 def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Sequence[Any]) -> str:
     head = "".join(f"<th>{html.escape(label_of(name))}</th><th>gain</th>" for name in config.objectives)
-    rows = [f"<tr><th></th><th>values</th><th>margin</th>{head}</tr>"]
+    rows = [f"<tr><th></th><th class=l>values</th><th>margin</th>{head}</tr>"]
     gains = {(c.contender, c.objective): c for c in comparisons}
     for contender in judged:
         values = ", ".join(f"{word} {value:.4g}" for word, value in contender.values.items()) or "–"
@@ -139,7 +139,8 @@ def _contenders(config: TuneConfig, judged: Sequence[Contender], comparisons: Se
                 gain_text += f" ({gain.low:.3g} to {gain.high:.3g})"
             cells += f"<td>{short(float(contender.means[k]))}</td><td>{gain_text}</td>"
         margin = "–" if contender.stability.margin is None else f"{contender.stability.margin:.3g}"
-        rows.append(f"<tr><td>{html.escape(contender.name)}</td><td>{values}</td><td>{margin}</td>{cells}</tr>")
+        values_cell = f"<td class=says>{values}</td>"
+        rows.append(f"<tr><td>{html.escape(contender.name)}</td>{values_cell}<td>{margin}</td>{cells}</tr>")
     return "".join(rows)
 
 
