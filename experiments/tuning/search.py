@@ -220,17 +220,24 @@ def pareto_front(candidates: Sequence[Candidate], directions: Sequence[str]) -> 
 
 
 def best_candidate(candidates: Sequence[Candidate], directions: Sequence[str]) -> Candidate | None:
-    """The best candidate for one objective; for several, the candidate on the front nearest to the ideal point.
-
-    Objectives are scaled to their range over all candidates that were tried: by the range on the front, the two ends of
-    a front of two would always be equally near. None if no candidate was tried.
-    """
+    """The best candidate for one objective; for several, the one of the front `nearest_to_ideal`; None if none."""
     signs, tried = signs_of(directions), [c.objectives for c in candidates if c.objectives is not None]
     if not tried:
         return None
-    low, span = (signs * np.array(tried)).min(axis=0), np.ptp(tried, axis=0)
+    front = pareto_front(candidates, directions)
+    return front[nearest_to_ideal(signs * np.array([c.objectives for c in front]), signs * np.array(tried))]
 
-    def distance(candidate: Candidate) -> float:
-        return float(np.linalg.norm((signs * np.array(candidate.objectives) - low) / np.where(span > 0.0, span, 1.0)))
 
-    return min(pareto_front(candidates, directions), key=distance)
+def nearest_to_ideal(front: Array, tried: Array) -> int:
+    """Index of the row of a Pareto front nearest to the ideal point, which has the least of each cost.
+
+    Costs are scaled to their range over all candidates that were tried: by the range on the front, the two rows of a
+    front of two would always be equally near.
+
+    Parameters
+    ----------
+    front, tried : Array
+        Costs of the front and of all candidates, shapes (n, costs) and (m, costs).
+    """
+    span = np.ptp(tried, axis=0)
+    return int(np.argmin(np.linalg.norm((front - tried.min(axis=0)) / np.where(span > 0.0, span, 1.0), axis=1)))

@@ -80,7 +80,8 @@ class TunedSimulation:
     Attributes
     ----------
     sim : Simulation
-        The simulation with the best values set; for several costs, those on the front with the least first cost.
+        The simulation with the best values set; for several costs, those of the front nearest to the least of each,
+        which are scaled to their ranges over the candidates.
     values : dict of str to float
         These values, by path.
     costs : tuple of float
@@ -129,7 +130,7 @@ def tune(
     """
     import optuna  # an optional dependency, which takes half a second to import
 
-    from experiments.tuning.search import MAX_PROPOSALS_RATIO, sampler_of
+    from experiments.tuning.search import MAX_PROPOSALS_RATIO, nearest_to_ideal, sampler_of
 
     check_kind("sim", sim, Simulation)
     check_kind("panel", panel, Sequence[User])
@@ -159,13 +160,13 @@ def tune(
             study.tell(trial, _mean_costs(candidate, users, cost, seconds, search, trial.params))
         else:
             study.tell(trial, state=optuna.trial.TrialState.PRUNED)
-    tried = len(study.get_trials(states=complete))
+    tried = [trial.values for trial in study.get_trials(states=complete)]
     refused = len(study.get_trials(states=(optuna.trial.TrialState.PRUNED,)))
     if not tried:
         raise ParameterError(f"none of {refused} candidates is certified; expected a space with some, or allow_unknown")
     front = tuple((dict(t.params), tuple(t.values)) for t in study.best_trials)
-    values, costs = min(front, key=lambda entry: entry[1])
-    return TunedSimulation(with_values(sim, values), values, costs, front, tried, refused)
+    values, costs = front[nearest_to_ideal(np.array([costs for _, costs in front]), np.array(tried))]
+    return TunedSimulation(with_values(sim, values), values, costs, front, len(tried), refused)
 
 
 def _check_space(space: Mapping[str, tuple[float, float]]) -> None:

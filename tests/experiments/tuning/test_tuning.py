@@ -294,3 +294,16 @@ def test_python_search_resumes_only_its_own_candidates(tmp_path: Path) -> None:
     assert found(9.0, lambda run: 3.0 - 2.0).costs == (1.0,)
     storage = storage_of(tmp_path / "journal")
     assert len(storage.get_all_studies()) == 3
+
+
+@pytest.mark.slow
+def test_of_several_costs_those_nearest_to_the_least_of_each_are_chosen() -> None:
+    curve, places = hvf.circle(radius=0.0477, lap=4.0), iter([(1.0, 5.0), (3.0, 1.0), (9.0, 6.0)])
+    sim = hvf.Simulation(
+        field=hvf.Follow(curve, k_r=300, b_d=8), haptic_map=hvf.Cylindrical(hvf.clips("walk"), around=curve),
+        figure=hvf.Figure(kind="none"),
+    )  # fmt: skip
+    search = hvf.Search(candidates=3, costs=2, sampler="random")
+    found = hvf.tune(sim, {"field.k_r": (50, 500)}, lambda run: next(places), seconds=0.05, search=search)
+    assert found.costs == (3.0, 1.0)
+    assert sorted(costs for _, costs in found.front) == [(1.0, 5.0), (3.0, 1.0)]
