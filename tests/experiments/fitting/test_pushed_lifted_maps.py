@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
@@ -38,14 +39,31 @@ def test_trial_pushes_out_and_in_with_pure_clip_between(lifted: Lifted, monkeypa
     assert difference.max() > 0.05
 
 
-def test_hand_is_late_outside_and_early_inside_without_pace_keeping(lifted: Lifted) -> None:
-    curve = lifted.curve(0)
-    pushed = 8e-3 * np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
-    lateness = np.arange(360) / 120.0 - hand_tours._slowed_phase(curve, pushed)  # pyright: ignore[reportPrivateUsage]
-    assert np.abs(lateness[:61]).max() < 1e-12
-    # On radii of 40 to 60 mm.
-    assert 8.0 / 68.0 < lateness[180] < 8.0 / 48.0
+def test_hand_is_late_outside_and_early_inside_without_pace_keeping() -> None:
+    curve = Trajectory.circle(0.05, 4.0)
+    push = np.concatenate([np.zeros(60), np.ones(120), np.zeros(60), -np.ones(120)])
+    phases = hand_tours._pushed_phases(curve, push, False)  # pyright: ignore[reportPrivateUsage]
+    lateness = np.arange(360) / 120.0 - phases
+    assert np.abs(lateness[:61]).max() < 1e-9
+    assert lateness[180] == pytest.approx(8.0 / 58.0, rel=1e-3)
     assert lateness[359] < lateness[240]
+
+
+def test_push_along_a_curve_whose_radius_changes_speeds_the_hand_up_or_slows_it_down() -> None:
+    """By 2.5 N over 8 N s/m times the sine of the curve's slope; on a circle the hand keeps its pace."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 61)
+    radii = 0.05 + 0.005 * np.cos(angles)
+    points = np.stack([radii * np.cos(angles), radii * np.sin(angles), np.zeros(61)], axis=1)
+    curve = Trajectory(np.linspace(0.0, 4.0, 61), points, periodic=True)
+    outwards = np.ones(60)
+    for at, pace in ((1.0, 1.0 - 0.3125 * 0.0995 / 0.0789), (3.0, 1.0 + 0.3125 * 0.0995 / 0.0789)):
+        begun = Trajectory(
+            curve.times + at, np.roll(points[:-1], -round(15 * at), axis=0)[[*range(60), 0]], periodic=True
+        )
+        phases = hand_tours._pushed_phases(begun, outwards, True)  # pyright: ignore[reportPrivateUsage]
+        assert 120.0 * phases[1] == pytest.approx(pace, abs=0.01)
+    kept = hand_tours._pushed_phases(Trajectory.circle(0.05, 4.0), outwards, True)  # pyright: ignore[reportPrivateUsage]
+    assert kept == pytest.approx(np.arange(60) / 120.0, abs=1e-6)
 
 
 FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
@@ -56,6 +74,11 @@ WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure
     ("verdicts", "legs", "share", "expected"),
     [
         ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
+        (
+            {"whole": LACKS, 1.0: Verdict(0.07, np.inf), 0.5: Verdict(0.068, np.inf), 0.25: Verdict(0.069, np.inf),
+             0.0: Verdict(0.069, np.inf)},
+            1, 1.0, (WHOLE_MAP_REMARK.format("has a residual of 20 % of weight"),),
+        ),
         ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
         (
             {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
