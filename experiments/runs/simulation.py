@@ -238,13 +238,20 @@ class Simulation:
             raise ParameterError("a user-defined map follows the curve of the field; expected a field with a curve")
         return curves[0]
 
+    def _course(self, around: Trajectory) -> Trajectory:
+        """The field's curve that lies along the map's, such as one timed by `paced`; else the map's."""
+        for curve in self.field.curves:
+            if curve.positions.shape == around.positions.shape and np.allclose(curve.positions, around.positions):
+                return curve
+        return around
+
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
         power, spring = limiter.peak * fastest(maps.curve), (np.inf, WORKSPACE_WIDTH)
         tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(
-            config=self, maps=maps, field=self.field, program=program, course=maps.curve,
+            config=self, maps=maps, field=self.field, program=program, course=self._course(maps.curve),
             user=self.user.hand(maps.curve, seconds, self.seed), tank=tank, gains=maps.gains,
             notes=Notes(type(self.field).__name__.upper(), maps.reach),
             argument_at=lambda nearest, phases: stylus_path(nearest),

@@ -28,6 +28,16 @@ def test_run_gives_measures_channels_animation_page_and_table(tmp_path: Path) ->
     assert {"force_0", "p_2"} <= set(run.frame().columns)
 
 
+def test_summary_counts_laps_of_the_paced_curve() -> None:
+    """In a slow lap friction is a fifth of the drive, by which `paced` shortens the field's curve."""
+    curve = hvf.circle(lap=16.0)
+    run = hvf.Simulation(
+        field=hvf.Follow(hvf.paced(curve, drag=8, stiffness=300), k_r=300, b_d=8),
+        haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=curve), figure=hvf.Figure(kind="kinematic"),
+    ).run(4.0)  # fmt: skip
+    assert run.summary.path.laps == pytest.approx(4.0 / 16.0, rel=0.05)
+
+
 def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
     *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.1, threads=2)
     assert isinstance(last, hvf.Swept)
