@@ -11,14 +11,14 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting import hand_tours, leg_choice
+from experiments.fitting import hand_tours, leg_choice, verdict
 from experiments.fitting.hand_tours import tour_along_curve
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import Trial, Verdict
+from experiments.fitting.verdict import Motion, Trial, Verdict
 from experiments.lifting.lift import lift_clips
 from experiments.setups.setups import map_parts
-from models.humanoid.skeleton import figure_model
-from models.mocap.motion.clip import pose_difference
+from models.humanoid.skeleton import figure_model, rest_pose
+from models.mocap.motion.clip import Clip, pose_difference
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
 
     monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(Trial, "verdict", tried)
-    monkeypatch.setattr(Trial, "is_sound", lambda *_: True)
+    monkeypatch.setattr(Trial, "is_sound", lambda *_, **__: True)
     part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, remarks) == (legs, share, expected)
 
@@ -114,7 +114,7 @@ def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
 def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
     monkeypatch.setattr(Trial, "verdict", lambda *_: Verdict(0.01, np.inf))
-    monkeypatch.setattr(Trial, "is_sound", lambda *_: False)
+    monkeypatch.setattr(Trial, "is_sound", lambda *_, **__: False)
     part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
     assert "feet skate" in remarks[0]
@@ -136,3 +136,12 @@ def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_pa
     parts = map_parts(run_config(map=str(tmp_path / "map.npz"), curve="cheer"), figure_model())
     assert parts.lap_seconds == parts.curve.duration == pytest.approx(lifted.curve(1).duration)
     assert lifted.lap_seconds != pytest.approx(lifted.curve(1).duration, rel=0.01)
+
+
+def test_one_stance_of_many_in_which_a_push_drags_a_foot_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pushes come once a lap; the measure of a map's animation otherwise leaves out a twentieth of the stances."""
+    still = Clip(np.repeat(rest_pose()[None], 4, axis=0), 120.0, "still")
+    monkeypatch.setattr(verdict, "motion_of", lambda *_: Motion(0.0, 0.0, 0.01, 0.06))
+    trial = Trial(__name__, lambda: still, 1.0, (np.random.default_rng().random(8),))
+    assert trial.is_sound()
+    assert not trial.is_sound(in_every_stance=True)
