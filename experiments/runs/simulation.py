@@ -240,8 +240,9 @@ class Simulation:
 
     def _course(self, around: Trajectory) -> Trajectory:
         """The field's curve that lies along the map's, such as one timed by `paced`; else the map's."""
+        places = np.asarray(around.positions)
         for curve in self.field.curves:
-            if curve.positions.shape == around.positions.shape and np.allclose(curve.positions, around.positions):
+            if np.shape(curve.positions) == places.shape and np.allclose(curve.positions, places):
                 return curve
         return around
 
