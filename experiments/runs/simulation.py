@@ -228,7 +228,10 @@ class Simulation:
         world, console = World(self.scene, self.body), Console(stderr=True)
         device, span = device_of(self, world, seconds), seconds or _DEFAULT_DURATION
         given = self.haptic_map
-        maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world, self.field)
+        if isinstance(given, HapticMap):
+            maps = own_parts(given, self._curve())
+        else:
+            maps = given.parts(world, self.field, bool(self.user.pushes))
         return wire_parts(world, maps, lambda m: self._parts(m, span), compiler(console), device)
 
     def _curve(self) -> Trajectory:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import hvf
+from experiments.runs import map_objects
+from sim.world.world import World
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +58,29 @@ def test_map_is_fitted_to_a_field_with_its_flow(parallel: bool, monkeypatch: pyt
     field = hvf.Follow(curve, k_r=300, b_d=8, parallel=parallel).limited(8.0)
     with pytest.raises(hvf.ParameterError, match=f"fitted to {parallel}"):
         hvf.Simulation(field=field, haptic_map=hvf.Composite(hvf.clips("walk"), around=curve)).session(1.0)
+
+
+@pytest.mark.parametrize(
+    ("pushes", "kind", "fitted"), [(1, "physical", True), (0, "physical", False), (1, "none", False)]
+)
+def test_lifted_map_is_fitted_to_a_hand_that_pushes_a_physical_figure(
+    pushes: int, kind: str, fitted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by `hvf run`: a walk whose feet a push dragged by 4 cm keeps its legs."""
+
+    def fit(*arguments: object) -> None:
+        raise hvf.ParameterError(f"fitted to {arguments[-1]}")
+
+    hvf.lift(["squat_dance", "cheer"], tmp_path / "map.npz")
+    lifted = hvf.Lifted(tmp_path / "map.npz")
+    monkeypatch.setattr(map_objects, "fitted_to_pushes", fit)
+    user = hvf.User(pushes=[hvf.Push(at=0.5, seconds=0.3, force=2.5)] * pushes)
+    field, world = hvf.Follow(lifted.around, k_r=300, b_d=8, parallel=True).limited(8.0), World(kind=kind)
+    if fitted:
+        with pytest.raises(hvf.ParameterError, match="fitted to True"):
+            hvf.Simulation(field=field, haptic_map=lifted, user=user).session(1.0)
+    else:
+        lifted.parts(world, field, bool(user.pushes))
 
 
 def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:
