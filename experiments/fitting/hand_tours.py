@@ -21,8 +21,11 @@ from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, map_poses, reference_along
 
 _DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
-_PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
+# [m] offset by a push on a lifted map, and [m/s] what a push along its curve adds to the speed: 2.5 N against 300 N/m
+# and 8 N s/m
+_PUSH_OFFSET, _PUSH_SPEED = 8e-3, 2.5 / 8.0
 _PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
+_GRID_SIZE = 500  # points at which a curve's radius and speed are taken
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
 _DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and the transition; [s] to the next river
 _RIVERS_DURATION = _DWELL_TIME * len(_ORDER)
@@ -61,14 +64,13 @@ def tour_along_curve(haptic_map: Lifted, curve: Trajectory, keeps_pace: bool) ->
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 
     If the field does not keep the pace off the curve (`Follow.parallel`), a push does not change the hand's speed, so
-    its angular speed is lower the further out it is.
+    its angular speed is lower the further out it is. Where the curve's radius changes, a part of the push is along it,
+    and speeds the hand up or slows it down in either flow.
     """
     times = _times(TRIAL_SECONDS)
-    pushed = _PUSH_OFFSET * _push_profile(np.maximum(times - _PUSH_INTERVAL, 0.0))
-    elapsed = times if keeps_pace else _slowed_phase(curve, pushed)
-    phases = elapsed % curve.duration if curve.periodic else np.minimum(elapsed, curve.duration)
-    points = curve.point(curve.start + phases)
-    points[:, :2] *= 1.0 + (pushed / np.hypot(points[:, 0], points[:, 1]))[:, None]
+    push = _push_profile(np.maximum(times - _PUSH_INTERVAL, 0.0))
+    points = curve.point(curve.start + _pushed_phases(curve, push, keeps_pace))
+    points[:, :2] *= 1.0 + (_PUSH_OFFSET * push / np.hypot(points[:, 0], points[:, 1]))[:, None]
     return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "pushed")
 
 
@@ -83,14 +85,20 @@ def _push_profile(times: Array) -> Array:
     return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * _PUSH_INTERVAL) % 2.0 == 0.0, 1.0, -1.0))
 
 
-def _slowed_phase(curve: Trajectory, pushed: Array) -> Array:
-    """Phase since the curve's start [s] of a hand off the curve by `pushed` [m], at the speed that it has on it."""
-    elapsed = np.zeros(len(pushed))
-    for k, offset in enumerate(pushed[:-1]):
-        phase = elapsed[k] % curve.duration if curve.periodic else min(elapsed[k], curve.duration)
-        radius = float(np.hypot(*curve.point(curve.start + phase)[:2]))
-        elapsed[k + 1] = elapsed[k] + radius / (radius + offset) / FPS
-    return elapsed
+def _pushed_phases(curve: Trajectory, push: Array, keeps_pace: bool) -> Array:
+    """Phases since the curve's start [s] of a hand that is pushed by `push` (n,), 1 outwards and -1 inwards."""
+    grid = np.linspace(0.0, curve.duration, _GRID_SIZE)
+    points, velocities = curve.point(curve.start + grid), curve.velocity(curve.start + grid)
+    radii, speeds = np.hypot(points[:, 0], points[:, 1]), np.linalg.norm(velocities, axis=1)
+    outward = np.sum(points[:, :2] * velocities[:, :2], axis=1) / (radii * speeds)  # cosine of tangent and push
+    added = _PUSH_SPEED * outward / speeds
+    phases = np.zeros(len(push))
+    for k, share in enumerate(push[:-1]):
+        radius, extra = np.interp(phases[k], grid, radii), share * np.interp(phases[k], grid, added)
+        pace = (1.0 if keeps_pace else radius / (radius + _PUSH_OFFSET * share)) + extra
+        phase = phases[k] + pace / FPS
+        phases[k + 1] = phase % curve.duration if curve.periodic else min(max(phase, 0.0), curve.duration)
+    return phases
 
 
 def tour_of_rivers(haptic_map: RiverClips, part: Figure, figure: mujoco.MjModel) -> Clip:

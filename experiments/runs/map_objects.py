@@ -24,7 +24,7 @@ from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
 from experiments.setups.maps.about_circle import Place, check_clips
 from experiments.setups.maps.cylindrical import CORNERS, PARTS, composite_parts, cylindrical_parts
-from experiments.setups.maps.map_file import lifted_parts
+from experiments.setups.maps.map_file import fitted_to_pushes, lifted_parts
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number
 from experiments.setups.parts.pace import check_reach
@@ -39,8 +39,8 @@ from sim.world.world import World
 class BodyMap(Protocol):
     """Factory of a haptic map for the body of a run; a ready `HapticMap` can be given to a `Simulation` instead."""
 
-    def parts(self, world: World, field: Law) -> ClipMapParts:
-        """What the map gives a run in a field."""
+    def parts(self, world: World, field: Law, pushed: bool) -> ClipMapParts:
+        """What the map gives a run in a field, with a hand that pushes or not."""
         ...
 
 
@@ -69,8 +69,8 @@ class _AboutCurve:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World, field: Law) -> ClipMapParts:
-        """What the map gives a run in a field."""
+    def parts(self, world: World, field: Law, pushed: bool) -> ClipMapParts:
+        """What the map gives a run in a field, with a hand that pushes or not."""
         parallel = any(isinstance(law, Follow) and law.parallel for law in field.program().laws)
         clips, place = tuple(self.clips), self._place()
         return for_size_of(world.body, lambda model: self.make_parts(clips, model, place, parallel))
@@ -181,10 +181,18 @@ class Lifted:
             raise SimError(f"{self.file}: its map is {type(haptic_map).__name__}; expected one that hvf.lift wrote")
         return haptic_map, clips
 
-    def parts(self, world: World, field: Law) -> ClipMapParts:
-        """What the map gives a run in a field."""
+    def parts(self, world: World, field: Law, pushed: bool) -> ClipMapParts:
+        """What the map gives a run in a field, with a hand that pushes or not."""
         part = MapFile(file=str(self.file), curve=self.curve, expressive=self.expressive)
-        return for_size_of(world.body, lambda _: lifted_parts(*self._map_and_clips, part))
+        follows = [law for law in field.program().laws if isinstance(law, Follow)]
+
+        def make_parts(_: MjModel) -> ClipMapParts:
+            haptic_map, clips = self._map_and_clips
+            parts = lifted_parts(haptic_map, clips, part)
+            fitted = pushed and world.kind == "physical" and bool(follows)
+            return fitted_to_pushes(haptic_map, parts, self.curve, follows[0].parallel) if fitted else parts
+
+        return for_size_of(world.body, make_parts)
 
 
 @dataclass(frozen=True, repr=False)
@@ -223,8 +231,8 @@ class RobotArm:
     def __repr__(self) -> str:
         return short_text(self)
 
-    def parts(self, world: World, field: Law) -> ClipMapParts:
-        """What the map gives a run in a field."""
+    def parts(self, world: World, field: Law, pushed: bool) -> ClipMapParts:
+        """What the map gives a run in a field, with a hand that pushes or not."""
         return arm_parts(world.body, self.around, self.reach, self.scale)
 
 

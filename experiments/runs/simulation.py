@@ -228,7 +228,10 @@ class Simulation:
         world, console = World(self.scene, self.body), Console(stderr=True)
         device, span = device_of(self, world, seconds), seconds or _DEFAULT_DURATION
         given = self.haptic_map
-        maps = own_parts(given, self._curve()) if isinstance(given, HapticMap) else given.parts(world, self.field)
+        if isinstance(given, HapticMap):
+            maps = own_parts(given, self._curve())
+        else:
+            maps = given.parts(world, self.field, bool(self.user.pushes))
         return wire_parts(world, maps, lambda m: self._parts(m, span), compiler(console), device)
 
     def _curve(self) -> Trajectory:
@@ -238,13 +241,21 @@ class Simulation:
             raise ParameterError("a user-defined map follows the curve of the field; expected a field with a curve")
         return curves[0]
 
+    def _course(self, around: Trajectory) -> Trajectory:
+        """The field's curve that lies along the map's, such as one timed by `paced`; else the map's."""
+        places = np.asarray(around.positions)
+        for curve in self.field.curves:
+            if np.shape(curve.positions) == places.shape and np.allclose(curve.positions, places):
+                return curve
+        return around
+
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
         power, spring = limiter.peak * fastest(maps.curve), (np.inf, WORKSPACE_WIDTH)
         tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(
-            config=self, maps=maps, field=self.field, program=program, course=maps.curve,
+            config=self, maps=maps, field=self.field, program=program, course=self._course(maps.curve),
             user=self.user.hand(maps.curve, seconds, self.seed), tank=tank, gains=maps.gains,
             notes=Notes(type(self.field).__name__.upper(), maps.reach),
             argument_at=lambda nearest, phases: stylus_path(nearest),

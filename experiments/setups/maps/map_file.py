@@ -51,17 +51,20 @@ def map_file_setup(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], fi
         if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
             parts = replace(parts, refined=partial(carried_over, haptic_map, best_transition(haptic_map, part.curve)))
         elif pushed and not isinstance(config.mode, Rivers):
-            number = curve_number(haptic_map, part.curve)
-            followed = partial(
-                followed_map, haptic_map, parts.curve, number, arms(haptic_map.limbs), flows_parallel(config)
-            )
-            parts = replace(parts, refined=followed)
+            parts = fitted_to_pushes(haptic_map, parts, part.curve, flows_parallel(config))
     elif part.curve:
         raise ParameterError("only a lifted map has curves by name; leave out --curve, or name a lifted map")
     else:
         parts = about_circle(place_of(part), haptic_map, clips)
     remark = f"the clips are those of the map: {', '.join(haptic_map.names)}"
     return replace(parts.with_remarks((remark,)), static={"map_sha256": map_digest(path)})
+
+
+def fitted_to_pushes(haptic_map: Lifted, parts: ClipMapParts, curve: str, keeps_pace: bool) -> ClipMapParts:
+    """The parts with as much of the map as the physical figure follows when pushed off a curve (`followed_map`)."""
+    number = curve_number(haptic_map, curve)
+    followed = partial(followed_map, haptic_map, parts.curve, number, arms(haptic_map.limbs), keeps_pace)
+    return replace(parts, refined=followed)
 
 
 def lifted_parts(haptic_map: Lifted, clips: tuple[Clip, ...], part: MapFile) -> ClipMapParts:

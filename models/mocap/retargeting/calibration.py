@@ -208,6 +208,8 @@ def _set_limbs(body: _Body, lines: BodyLines, k: int, weights: Array) -> None:
     """Arm, hand and leg of a side, from the bones and hinge axes in `lines`."""
     side, sign = SIDES[k], 1.0 - 2.0 * k
     elbow, knee = -sign * lines.elbow_normals()[:, k], lines.knee_normals()[:, k]
+    # A knee that bends back is a fault of the capture, and no evidence of where the leg faces.
+    knee = np.where(np.sum(knee * lines.left, axis=1, keepdims=True) < 0.0, 0.0, knee)
     bones = (
         (f"{side}_clavicle", f"{side}_upper_arm", lines.shoulders, lines.elbows, elbow, (1, sign), 2),
         (f"{side}_upper_arm", f"{side}_forearm", lines.elbows, lines.wrists, elbow, (1, sign), 2),

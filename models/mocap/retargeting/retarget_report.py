@@ -27,6 +27,9 @@ _MIN_RANGE_EXCESS = np.deg2rad(15.0)
 # high, and a flight of 1 s rises by 1.2 m. The longest flight in the 28 captures of
 # docs/validation/prepared-captures.md lasts 0.5 s.
 _MIN_ALOFT_HEIGHT, _MIN_ALOFT_TIME = 0.1, 1.0
+_MAX_JUMP_HEIGHT = (
+    1.5  # height of the soles that no jump reaches [m]: 1.2 m where the centre of mass rises by 1 m, tucked
+)
 # In a file of a wrong frame rate a body in flight falls along a parabola, but not with g: largest fraction of g, least
 # change of height [m], and largest RMS distance from the parabola over that change. Two jumps in a file of 120 frames a
 # second that states 24 have 0.04, 0.1 m and 0.03.
@@ -256,7 +259,7 @@ def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
 
 
 def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> Iterator[str]:
-    """Times at which the body is above the floor for longer than any flight, and at which it is below it.
+    """Times at which the body is above the floor for longer or further than in any flight, and at which it is below it.
 
     Parameters
     ----------
@@ -282,6 +285,9 @@ def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> It
             rate = fps * float(np.sqrt(GRAVITY / fall))
             why = f"at {two_digits(rate)} frames a second instead of {fps:g} it would fall freely; see --frame-rate"
         yield f"the body is {how}: {why}"
+    elif clearance.max() > _MAX_JUMP_HEIGHT:
+        how = f"the body rises to {clearance.max():.2f} m above the floor, higher than anyone jumps"
+        yield f"{how}: it stands on something that is not in the file, or its place is in another unit than its bones"
     beneath = spans(clearance < -_MIN_DEPTH)
     if beneath:
         how = f"up to {-float(clearance.min()):.2f} m beneath the floor, for {_duration_text(beneath, fps, dropped)}"

@@ -77,6 +77,10 @@ _DIRECTION_COUNT = 16  # directions in which the hull of the bearing joints is b
 _MIN_ANIMAL_TRUNK, _MAX_ANIMAL_COSINE = 0.8, 0.5
 # Least mean sine of the knees' bend, and cosine of the toes' direction, that distinguish left from right.
 _MIN_EVIDENCE = 0.15
+# Least mean distance of the wrists ahead of the shoulders [leg lengths] that shows where a body faces. Of 128 gestures
+# before depth cameras 0.22 and more in the 13 whose knees seem to bend back by 9 to 24°; a walk of a mirrored body has
+# less than 0.
+_MIN_REACH = 0.15
 
 
 class Up(NamedTuple):
@@ -292,6 +296,8 @@ def check_biped(motion: SourceMotion, lines: BodyLines) -> None:
 def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
     """Refuse a mirrored body: hips and trunk define left, which toes, the bend of the knees and the arms must confirm.
 
+    Depth cameras see straight knees bend back: they alone show nothing if hands are held out to where the body faces.
+
     Raises
     ------
     MotionFileError
@@ -312,6 +318,8 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"
         what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
         raise MotionFileError(motion.path, 0, what, stated)
+    if abs(signs[0]) <= _MIN_EVIDENCE and _reach(lines, left) > _MIN_REACH:
+        return
     if clear and sum(clear) < 0:
         back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_MIN_EVIDENCE)
         raise MotionFileError(motion.path, 0, f"the body is mirrored: {back} point back", stated)
@@ -319,3 +327,10 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         raise MotionFileError(
             motion.path, 0, "toes and knees point opposite ways", "a body that bends its knees forwards"
         )
+
+
+def _reach(lines: BodyLines, left: Array) -> float:
+    """Mean distance of the wrists ahead of the shoulders [leg lengths]; 0 without arms."""
+    ahead = np.cross(left, unit(lines.trunk))
+    reach = np.sum((lines.wrists - lines.shoulders) * ahead[:, None], axis=2) / lines.leg
+    return float(np.nanmean(reach)) if np.isfinite(reach).any() else 0.0

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import hvf
+from experiments.runs import map_objects
+from sim.world.world import World
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +30,16 @@ def test_run_gives_measures_channels_animation_page_and_table(tmp_path: Path) ->
     assert {"force_0", "p_2"} <= set(run.frame().columns)
 
 
+def test_summary_counts_laps_of_the_paced_curve() -> None:
+    """In a slow lap friction is a fifth of the drive, by which `paced` shortens the field's curve."""
+    curve = hvf.circle(lap=16.0)
+    run = hvf.Simulation(
+        field=hvf.Follow(hvf.paced(curve, drag=8, stiffness=300), k_r=300, b_d=8),
+        haptic_map=hvf.Cylindrical(hvf.clips("cheer"), around=curve), figure=hvf.Figure(kind="kinematic"),
+    ).run(4.0)  # fmt: skip
+    assert run.summary.path.laps == pytest.approx(4.0 / 16.0, rel=0.05)
+
+
 def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
     *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.1, threads=2)
     assert isinstance(last, hvf.Swept)
@@ -46,6 +58,29 @@ def test_map_is_fitted_to_a_field_with_its_flow(parallel: bool, monkeypatch: pyt
     field = hvf.Follow(curve, k_r=300, b_d=8, parallel=parallel).limited(8.0)
     with pytest.raises(hvf.ParameterError, match=f"fitted to {parallel}"):
         hvf.Simulation(field=field, haptic_map=hvf.Composite(hvf.clips("walk"), around=curve)).session(1.0)
+
+
+@pytest.mark.parametrize(
+    ("pushes", "kind", "fitted"), [(1, "physical", True), (0, "physical", False), (1, "none", False)]
+)
+def test_lifted_map_is_fitted_to_a_hand_that_pushes_a_physical_figure(
+    pushes: int, kind: str, fitted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by `hvf run`: a walk whose feet a push dragged by 4 cm keeps its legs."""
+
+    def fit(*arguments: object) -> None:
+        raise hvf.ParameterError(f"fitted to {arguments[-1]}")
+
+    hvf.lift(["squat_dance", "cheer"], tmp_path / "map.npz")
+    lifted = hvf.Lifted(tmp_path / "map.npz")
+    monkeypatch.setattr(map_objects, "fitted_to_pushes", fit)
+    user = hvf.User(pushes=[hvf.Push(at=0.5, seconds=0.3, force=2.5)] * pushes)
+    field, world = hvf.Follow(lifted.around, k_r=300, b_d=8, parallel=True).limited(8.0), World(kind=kind)
+    if fitted:
+        with pytest.raises(hvf.ParameterError, match="fitted to True"):
+            hvf.Simulation(field=field, haptic_map=lifted, user=user).session(1.0)
+    else:
+        lifted.parts(world, field, bool(user.pushes))
 
 
 def test_repr_of_public_objects_is_short(sim: hvf.Simulation, run: hvf.Run) -> None:

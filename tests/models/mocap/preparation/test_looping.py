@@ -85,6 +85,19 @@ def test_cycle_lacks_a_short_event_at_most_and_measures_it(turning, seconds, kep
     assert found.left_out == pytest.approx(left_out, abs=0.15)
 
 
+@pytest.mark.parametrize(("angle", "kept"), [(1.4, True), (0.9, False)])
+def test_gesture_of_one_arm_is_kept_or_told(angle, kept, turning):
+    """An arm is raised by 80° or 50° for a tenth of a walk, in which it swings by 15° or so."""
+    walk = turning[0](lambda x: 0.0)
+    raised, shoulder = np.zeros((walk.n_frames, 57)), 6 + 3 * JOINTS.index("left_shoulder")
+    times = np.arange(walk.n_frames) / walk.fps
+    raised[:, shoulder] = angle * np.clip((0.7 - np.abs(times - 5.0)) / 0.1, 0.0, 1.0)
+    found = close_or_rest(Clip(add_tangents(walk.poses, raised), walk.fps, "gesture"))
+    turned = pose_difference(np.repeat(walk.poses[:1], found.clip.n_frames, axis=0), found.clip.poses)[:, shoulder]
+    assert (np.ptp(turned) > 0.8 * angle) == kept
+    assert found.left_out == pytest.approx((0.0, 0.0) if kept else (1.3, 4.35), abs=0.15)
+
+
 def test_looped_returns_a_closed_clip_unchanged(walks):
     assert close_or_rest(walks[0]).clip is walks[0]
 

@@ -70,6 +70,14 @@ def test_body_above_the_floor_for_longer_than_a_flight_is_remarked(height, tmp_p
     assert "longer than any flight" in floor_remark
 
 
+def test_flight_higher_than_any_jump_is_remarked():
+    """Its root is in another unit than its bones: a rise of 2 m within half a second."""
+    clearance = np.maximum(2.0 * np.sin(np.linspace(-np.pi, 2.0 * np.pi, 150)), 0.0)
+    (remark,) = floor_remarks(clearance, np.zeros((150, 3)), 100.0, 0)
+    assert "rises to 2.00 m above the floor, higher than anyone jumps" in remark
+    assert not list(floor_remarks(0.6 * clearance, np.zeros((150, 3)), 100.0, 0))
+
+
 @pytest.mark.parametrize("name", ["walk", "jump", "backflip", "run"])
 def test_flights_and_steps_give_no_floor_remark(name, tmp_path):
     report = report_of(embedded(name), tmp_path / "r.bvh")

@@ -416,6 +416,37 @@ def test_kneeling_body_is_not_taken_for_mirrored(motions, tmp_path):
         load(tmp_path / "r.bvh", Hints(up="+Y"))
 
 
+def seen_by_a_depth_camera(clip, knees, reach):
+    """The clip on straight legs whose knees seem to bend by some angles, with arms `reach` ahead of hanging [deg]."""
+    legs = [(f"{side}_{part}", "y", degrees) for side, knee in zip(("left", "right"), knees, strict=True)
+            for part, degrees in (("thigh", 0.0), ("shank", knee), ("foot", -knee))]  # fmt: skip
+    still = posed([*legs, ("left_forearm", "y", 0.0), ("right_forearm", "y", 0.0)], clip)
+    for side, down in (("left", -80.0), ("right", 80.0)):
+        k = 3 + 4 * BODIES.index(f"{side}_upper_arm")
+        arm = Rotation.from_euler("xy", (down, -reach), degrees=True)
+        still.poses[:, k : k + 4] = arm.as_quat(scalar_first=True)
+    return still
+
+
+@pytest.mark.parametrize("knees", [(-20.0, -20.0), (-20.0, 3.0)])
+def test_legs_face_ahead_though_straight_knees_seem_to_bend_back(knees, motions, tmp_path):
+    """Depth cameras see them so; without toes, hands that are held out tell where the body faces."""
+    rig = Rig(zero="random", without=("toe",), tips=None)
+    write_rig(rig, seen_by_a_depth_camera(motions.clip("cheer"), knees, 60.0), tmp_path / "r.bvh")
+    rotations = global_rotations(load(tmp_path / "r.bvh", Hints(up="+Y")).clip.poses)
+    ahead = quaternions.rotated(rotations, np.array([1.0, 0.0, 0.0]))
+    for part in ("left_thigh", "left_shank", "right_thigh", "right_shank"):
+        turned = np.sum(ahead[:, BODIES.index(part)] * ahead[:, BODIES.index("pelvis")], axis=1)
+        assert np.median(turned) > np.cos(np.deg2rad(30.0))
+
+
+def test_body_with_hanging_arms_whose_knees_bend_back_may_be_mirrored(motions, tmp_path):
+    back = seen_by_a_depth_camera(motions.clip("cheer"), (-20.0, -20.0), 0.0)
+    write_rig(Rig(without=("toe",), tips=None), back, tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match="the body is mirrored: knees point back"):
+        load(tmp_path / "r.bvh", Hints(up="+Y"))
+
+
 def test_sole_orientation_of_a_squat_on_the_toes_is_remarked_as_a_guess(motions, tmp_path):
     """Its feet are at rest and low but not level: no ankle is bent by 50° on average."""
     squat = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
