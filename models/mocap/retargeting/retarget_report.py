@@ -27,9 +27,8 @@ _MIN_RANGE_EXCESS = np.deg2rad(15.0)
 # high, and a flight of 1 s rises by 1.2 m. The longest flight in the 28 captures of
 # docs/validation/prepared-captures.md lasts 0.5 s.
 _MIN_ALOFT_HEIGHT, _MIN_ALOFT_TIME = 0.1, 1.0
-_MAX_JUMP_HEIGHT = (
-    1.5  # height of the soles that no jump reaches [m]: 1.2 m where the centre of mass rises by 1 m, tucked
-)
+# Height of the soles that no jump reaches [m]: 1.2 m where the centre of mass rises by 1 m, tucked.
+_MAX_JUMP_HEIGHT = 1.5
 # In a file of a wrong frame rate a body in flight falls along a parabola, but not with g: largest fraction of g, least
 # change of height [m], and largest RMS distance from the parabola over that change. Two jumps in a file of 120 frames a
 # second that states 24 have 0.04, 0.1 m and 0.03.
