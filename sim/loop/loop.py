@@ -195,9 +195,9 @@ class Loop:
             if self._before_tick is not None:
                 self._before_tick(tick)
             read_device(servo.device, tick * servo.plant.period)
-            hand = HandState.of(servo.device.hand)
             for slot, law in zip(self._law_slots, self._laws, strict=True):
-                servo.field.memory[slot : slot + 6] = law(hand)
+                # Of its own, so that a law that changes its arrays (p -= centre) does so for itself alone.
+                servo.field.memory[slot : slot + 6] = law(HandState.of(servo.device.hand))
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
             run_block(servo, tick, 1, False, tick_rows, frame_rows)
