@@ -103,7 +103,7 @@ class Run:
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
             return run
         folder = Path(record)
-        with claimed_and_cleared(folder, overwrite):
+        with claimed_and_cleared(folder, overwrite, session.config.device):
             summary = record_session(session, folder, config, seconds, started, console)
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
