@@ -109,7 +109,7 @@ class Run:
             if isinstance(session.config, RunConfig):
                 write_text(folder / CONFIG, to_json(session.config))
             write_summary(folder, summary)
-            run = Run(folder, summary, session)
+            run = Run(folder.absolute(), summary, session)  # wherever the program goes
             run.report()
         return run
 
