@@ -149,11 +149,11 @@ class TipDriver:
         if not np.isfinite(torque).all():
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, float(torque[~np.isfinite(torque)][0]))
+        theta = self._reading[READING_THETA : READING_THETA + 3]
+        force_at_tip(theta, torque, self._device.largest_force, self._force)  # compiled while the motors are off
         if not enable:
             self._guarded(self._device.release)
             return
-        theta = self._reading[READING_THETA : READING_THETA + 3]
-        force_at_tip(theta, torque, self._device.largest_force, self._force)
         try:
             self._guarded(lambda: self._device.write(self._force.copy()))
         except DriverFault:
