@@ -117,6 +117,9 @@ class TipDriver:
         self.telemetry = make_telemetry()
         self._reading, self._force = np.zeros(READING_SIZE), np.zeros(3)
         self._printed = list[str]()
+        # Compiled now: while the servo warms up there is no force, and perhaps no reading yet.
+        write_pose(np.zeros(READING_SIZE), np.zeros(3), np.eye(3))
+        force_at_tip(np.zeros(3), np.zeros(3), device.largest_force, np.zeros(3))
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; `timeout` is unused.
@@ -149,11 +152,11 @@ class TipDriver:
         if not np.isfinite(torque).all():
             self.let_go()
             raise DriverFault(Fault.FORCE_NOT_FINITE, float(torque[~np.isfinite(torque)][0]))
-        theta = self._reading[READING_THETA : READING_THETA + 3]
-        force_at_tip(theta, torque, self._device.largest_force, self._force)  # compiled while the motors are off
         if not enable:
             self._guarded(self._device.release)
             return
+        theta = self._reading[READING_THETA : READING_THETA + 3]
+        force_at_tip(theta, torque, self._device.largest_force, self._force)
         try:
             self._guarded(lambda: self._device.write(self._force.copy()))
         except DriverFault:
