@@ -28,6 +28,7 @@ from geometry.errors import HvfError
 
 _DESCRIPTION = f"{__doc__} hvf --version prints the version."
 _STYLE = (tyro.conf.FlagCreatePairsOff, tyro.conf.HelptextFromCommentsOff, tyro.conf.DisallowNone)
+_SHELLS = ("bash", "zsh", "fish")  # for which tyro writes completions without another package
 WELCOME = """hvf: a hand on a force-feedback arm feels an animation as a river, follows it, bends it.
 
   hvf demo                            see it work: a run, and a page to open in a browser
@@ -163,6 +164,8 @@ def _refuse_empty(words: Sequence[str]) -> None:
     for word, following in itertools.pairwise([*words, "--"]):
         if word == "--clips" and following.startswith("--"):  # tyro would take the default clips
             raise ParameterError("nothing is given after --clips; expected one or more names")
+        if word in ("--tyro-print-completion", "--tyro-write-completion") and following not in _SHELLS:
+            raise ParameterError(f"{word} is {following.strip('-')!r}; expected {', '.join(_SHELLS)}")
 
 
 def _join_axis_values(words: Sequence[str]) -> list[str]:

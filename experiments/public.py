@@ -7,6 +7,7 @@ from pathlib import Path
 from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from experiments.config.keywords import to_keywords, with_keyword_messages
+from experiments.config.maps import Circle
 from experiments.files.given_path import given_path
 from experiments.lifting.lift_report import lift_into
 from experiments.preparation.command import prepare_file
@@ -61,9 +62,10 @@ def circle(radius: float = 0.0477, lap: float = 4.0) -> Trajectory:
     Raises
     ------
     ControllerError
-        If one of them is no number, not positive, or not finite.
+        If one of them is no number, the radius not positive and finite, or the lap not between 0.1 s and a day.
     """
-    return Trajectory.circle(radius, checked("lap", lap, "s"))
+    around = Circle(radius=radius, lap=checked("lap", lap, "s"))
+    return Trajectory.circle(around.radius, lap)
 
 
 def version() -> str:

@@ -74,11 +74,11 @@ class PythonCallback:
         def evaluate(x: Any, target: Any, derivative: Any, nq: int, rows: int) -> None:
             last = self._last  # local to this call, since the runs of a sweep call in several threads
             if self.error is None:
-                stylus = np.ctypeslib.as_array(x, (7,)).copy()
-                self._last = last = checked_pose(pose(stylus), nq, name, stylus)
+                stylus = np.ctypeslib.as_array(x, (7,))  # copied, since a map may change its argument (x[:3] -= centre)
+                self._last = last = checked_pose(pose(stylus.copy()), nq, name, stylus)
                 if rows:
                     np.ctypeslib.as_array(derivative, (rows, 6))[:] = checked_jacobian(
-                        jacobian(stylus), rows, name, stylus
+                        jacobian(stylus.copy()), rows, name, stylus
                     )
             np.ctypeslib.as_array(target, (nq,))[:] = last
 
@@ -189,7 +189,8 @@ def finite_differences(pose: Callable[[Array], Pose], x: Array, step: float = _D
     columns: list[Array] = []
     for k in range(6):
         before, after = (_displace(x, k, distance) for distance in (-step, step))
-        columns.append(difference(pose(before), pose(after)) / (2.0 * step))
+        first = np.array(pose(before))  # copied, since a map may return one array that it writes anew
+        columns.append(difference(first, pose(after)) / (2.0 * step))
     return np.stack(columns, axis=1)
 
 

@@ -37,7 +37,7 @@ class Command(Where):
         except ImportError as error:
             missing = f"tuning needs {error.name}; expected pip install 'haptic-vector-fields[study]'"
             raise StudyError(missing) from None
-        text = self.tuning.read_text(encoding="utf-8")
+        text = self.tuning.read_text(encoding="utf-8-sig")
         found = run_tuning(config, self.out, text, self)
         written = f"Written to {self.out}: {REPORT} (open it in a browser), {CHOSEN} (for hvf run --config)."
         print(found.to_json() if self.json else f"{found}\n{written}")

@@ -14,15 +14,15 @@ class Circle:
     Parameters
     ----------
     lap : float, optional
-        Time of a lap [s]; in less than a tenth of a second no hand completes one. By default 4 s, or, if the map plays
-        motion files, the lap in which its clips play nearest to their own pace.
+        Time of a lap [s], at most a day; in less than a tenth of a second no hand completes one. By default 4 s, or, if
+        the map plays motion files, the lap in which its clips play nearest to their own pace.
     radius : float
         Radius of the circle [m].
     wave : float
         How far it goes up and down, three times a lap, so that every joint of the device turns [m].
     """
 
-    lap: float | None = at_least(0.1, default=None, unit="s")
+    lap: float | None = at_least(0.1, default=None, unit="s", most=86_400.0)
     radius: float = above(0.0, default=0.0477, unit="m")
     wave: float = at_least(0.0, default=0.0, unit="m")
 

@@ -3,6 +3,7 @@
 A part takes keyword arguments. A wrong one raises `ParameterError`, with the keyword, its value and what is expected.
 """
 
+import codecs
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -148,7 +149,7 @@ def from_file(cls: type[_Part], path: Path) -> _Part:
         If it cannot be read.
     """
     try:
-        text = path.read_bytes()
+        text = path.read_bytes().removeprefix(codecs.BOM_UTF8)  # of an editor on Windows
     except OSError as error:
         raise SimError(f"{path}: cannot be read ({error.strerror}); expected the JSON of a configuration") from None
     return from_json(cls, text, str(path))

@@ -45,11 +45,12 @@ def cost_estimate(out: Path, seconds: float, groups: Mapping[str, Group]) -> str
 
 
 def _check_disk_space(out: Path, seconds: float, rate: float) -> None:
-    size, free = seconds * rate, _free_bytes(out)
-    if size + DISK_RESERVE > free:
+    size, free = seconds * rate, max(0.0, _free_bytes(out) - DISK_RESERVE)
+    if size > free:
+        expected = f"less than {free / rate:.3g} s" if free else "another --out"
         raise ParameterError(
-            f"--seconds is {seconds:g}: a recording of {_size_text(size)} or more, and {_size_text(free)} are free "
-            f"where {out} is; expected less than {max(0.0, free - DISK_RESERVE) / rate:.3g} s"
+            f"--seconds is {seconds:g}: a recording of {_size_text(size)} or more, and {_size_text(free)} are free for "
+            f"it where {out} is; expected {expected}"
         )
 
 

@@ -107,7 +107,7 @@ def read_device_file(path: Path) -> dict[str, Any]:
         If the file cannot be read, or is not a device file.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
         if content["format"] != _FORMAT_NAME:
             raise KeyError(f"format {content['format']!r}")
         _check_content(content)

@@ -13,7 +13,7 @@ import mujoco
 
 from controllers.errors import ParameterError
 from experiments.config.part import from_dict
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import Phantom, Replay, RunConfig
 from experiments.files.curve_files import CURVE_FILE
 from experiments.files.made_folder import made_folder
 from models.mocap.motion.clip import Clip
@@ -70,8 +70,10 @@ def locked_folder(out: Path) -> Generator[None]:
 
 
 @contextmanager
-def claimed_and_cleared(out: Path, overwrite: bool) -> Generator[None]:
+def claimed_and_cleared(out: Path, overwrite: bool, device: Phantom | Replay) -> Generator[None]:
     """Lock a folder as `locked_folder` does, and clear it for a run; raises SimError if it must not be written into."""
+    if isinstance(device, Replay) and Path(device.run).resolve() == out.resolve():
+        raise SimError(f"{out}: is the run whose hand is replayed, which the new one refers to; choose another --out")
     with locked_folder(out):
         check_holds(out, overwrite)
         clear_folder(out)

@@ -73,7 +73,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     cost_message = cost_estimate(out, full_config.seconds, groups(session.servo))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
-    with results.claimed_and_cleared(out, overwrite):
+    with results.claimed_and_cleared(out, overwrite, config.device):
         write_text(out / results.CONFIG, to_json(full_config))
         summary = record(session, out, to_dict(full_config), full_config.seconds, started, console, view)
         write_animations(out, session)

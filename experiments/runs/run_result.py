@@ -103,13 +103,13 @@ class Run:
             weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
             return run
         folder = Path(record)
-        with claimed_and_cleared(folder, overwrite):
+        with claimed_and_cleared(folder, overwrite, session.config.device):
             summary = record_session(session, folder, config, seconds, started, console)
             write_animations(folder, session)
             if isinstance(session.config, RunConfig):
                 write_text(folder / CONFIG, to_json(session.config))
             write_summary(folder, summary)
-            run = Run(folder, summary, session)
+            run = Run(folder.absolute(), summary, session)  # wherever the program goes
             run.report()
         return run
 

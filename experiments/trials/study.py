@@ -92,7 +92,7 @@ class Study:
         """
         file = given_path("path", path)
         config = parse_study(read_toml(file, "a study"), str(file))
-        return Study(config, file.read_text(encoding="utf-8"))
+        return Study(config, file.read_text(encoding="utf-8-sig"))
 
     @staticmethod
     def of(**values: object) -> "Study":

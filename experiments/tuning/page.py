@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.stability import boundary
@@ -30,6 +31,7 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         best = np.maximum.accumulate(costs) if more_is_better(config.objectives[0]) else np.minimum.accumulate(costs)
         axis.plot(costs[:, 0], "o", color=_TRIED, ms=4, label="tried")
         axis.plot(best[:, 0], color=_FRONT, drawstyle="steps-post", label="best so far")
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         axis.set_xlabel("candidate")
         axis.set_ylabel(label_of(config.objectives[0]))
         axis.set_yscale("log")

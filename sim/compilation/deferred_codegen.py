@@ -20,6 +20,7 @@ from llvmlite import ir
 from numba.core import base, codegen, cpu, dispatcher, sigutils, targetconfig
 from numba.core.environment import lookup_environment
 
+from sim.compilation.lost_interrupts import reraise_lost_interrupts
 from sim.errors import SimError
 
 TESTED = ("0.68",)
@@ -262,7 +263,8 @@ def _compile_anew_for_python() -> None:
     def compile_signature(self: Any, signature: Any) -> Any:
         arguments, _ = sigutils.normalize_signature(signature)
         forget_part(self, tuple(arguments))
-        return compile_(self, signature)
+        with reraise_lost_interrupts():  # LLVM calls Python back with the object that it has made
+            return compile_(self, signature)
 
     def get_compile_result(self: Any, signature: Any) -> Any:
         forget_part(self, tuple(signature.args))

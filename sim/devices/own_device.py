@@ -117,6 +117,9 @@ class TipDriver:
         self.telemetry = make_telemetry()
         self._reading, self._force = np.zeros(READING_SIZE), np.zeros(3)
         self._printed = list[str]()
+        # Compiled now: while the servo warms up there is no force, and perhaps no reading yet.
+        write_pose(np.zeros(READING_SIZE), np.zeros(3), np.eye(3))
+        force_at_tip(np.zeros(3), np.zeros(3), device.largest_force, np.zeros(3))
 
     def read(self, reading: Array, timeout: float) -> bool:
         """See `sim.devices.driver.Driver.read`; `timeout` is unused.

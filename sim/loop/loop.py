@@ -2,18 +2,17 @@
 
 import resource
 import sys
-import threading
 import time
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.state import HandState
 from geometry.arrays import Array
+from sim.compilation.lost_interrupts import reraise_lost_interrupts
 from sim.devices.device import available_ticks, read_device
 from sim.errors import SimError
 from sim.loop.channels import configuration_size
@@ -182,7 +181,7 @@ class Loop:
             self._ask(self.time)
 
     def _run_block(self, n: int, ticks: TickLog, frames: FrameLog) -> None:
-        with _reraise_lost_interrupts():
+        with reraise_lost_interrupts():
             if self._laws or self._before_tick is not None:
                 self._run_tick_by_tick(n, ticks, frames)
             else:
@@ -195,36 +194,9 @@ class Loop:
             if self._before_tick is not None:
                 self._before_tick(tick)
             read_device(servo.device, tick * servo.plant.period)
-            hand = HandState.of(servo.device.hand)
             for slot, law in zip(self._law_slots, self._laws, strict=True):
-                servo.field.memory[slot : slot + 6] = law(hand)
+                # Of its own, so that a law that changes its arrays (p -= centre) does so for itself alone.
+                servo.field.memory[slot : slot + 6] = law(HandState.of(servo.device.hand))
             tick_rows = TickLog(*(channel[k : k + 1] for channel in ticks))
             frame_rows = FrameLog(*(channel[row : row + 1] for channel in frames))
             run_block(servo, tick, 1, False, tick_rows, frame_rows)
-
-
-@contextmanager
-def _reraise_lost_interrupts() -> Generator[None]:
-    """Raise a KeyboardInterrupt that ctypes dropped in a callback of a tick, such as a map in Python, after the block.
-
-    An interrupt during compiled code is raised where the next callback begins, before its code can catch anything;
-    ctypes then drops it and only reports it to `sys.unraisablehook`.
-    """
-    if threading.current_thread() is not threading.main_thread():  # other threads get no signals
-        yield
-        return
-    old_hook, lost = sys.unraisablehook, list[BaseException]()
-
-    def keep_interrupts(unraisable: Any) -> None:
-        if isinstance(unraisable.exc_value, KeyboardInterrupt):
-            lost.append(unraisable.exc_value)
-        else:
-            old_hook(unraisable)
-
-    sys.unraisablehook = keep_interrupts
-    try:
-        yield
-    finally:
-        sys.unraisablehook = old_hook
-    if lost:
-        raise lost[0]

@@ -68,6 +68,14 @@ def test_written_force_is_the_field_force_up_to_the_device_limit() -> None:
     assert device.written[-1] is None
 
 
+def test_what_poses_and_forces_need_is_compiled_before_the_first_of_them(monkeypatch) -> None:
+    called: list[str] = []
+    for name in ("write_pose", "force_at_tip"):
+        monkeypatch.setattr(f"sim.devices.own_device.{name}", lambda *_, name=name: called.append(name))
+    TipDriver(Scripted(), "here")
+    assert called == ["write_pose", "force_at_tip"]
+
+
 def test_torque_that_is_not_finite_releases_the_device() -> None:
     device = Scripted(TipPose(POSITION))
     driver = TipDriver(device, "here")

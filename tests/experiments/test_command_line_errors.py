@@ -36,6 +36,8 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
         (["live", "--clips", "--mode", "lead"], "nothing is given after --clips; expected one or more names"),
         (["live", "--clips", "nope.bvh"], "nope.bvh: cannot be opened (No such file or directory)"),
         (["live", "--map", "nope.npz"], "nope.npz: cannot be read (No such file or directory)"),
+        (["--tyro-print-completion", "tcsh"], "--tyro-print-completion is 'tcsh'; expected bash, zsh, fish"),
+        (["run", "--tyro-print-completion"], "--tyro-print-completion is ''; expected bash, zsh, fish"),
         (["run", "--bogus", "1"], "unrecognized options: --bogus, 1; hvf run --help"),
         (["certify", "--no-no-hand"], "unrecognized options: --no-no-hand"),
         (["run", "--no-governor"], "unrecognized options: --no-governor"),

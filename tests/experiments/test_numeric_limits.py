@@ -20,6 +20,7 @@ from sim.users.person.population import persona, population
         ("certify --delay 3", "the delay of a loop must be at most 128 periods of 0.001 s, got 3.0 s"),
         ("run --mode lead --floor-scale 1e14", "--floor-scale is 1e+14; expected at most 10000"),
         ("arm --lap 1e-9", "--lap is 1e-09; expected 0.1 s or more, and finite"),
+        ("run --lap 1e10 --clips walk run", "--lap is 1e+10; expected at most 86400 s"),
         ("arm --radius 5", "the Phantom does not reach (4.330, 0.000, 2.500) m of the hand frame"),
         ("hardware doctor --seconds 1e12", "--seconds is 1e+12; expected at most 3600 s"),
         ("hardware calibrate --seconds 1e12", "--seconds is 1e+12; expected at most 3600 s"),

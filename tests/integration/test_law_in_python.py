@@ -32,17 +32,21 @@ def _run(program, seconds=0.2):
 def test_tick_with_python_law_equals_the_compiled_tick_exactly():
     seen = []
 
+    def careless(hand):
+        hand.p[:] = hand.v[:] = 0.0
+        return hand.p
+
     def nothing(hand):
         seen.append((hand.t, *hand.p, *hand.v))
         return np.zeros(3)
 
     compiled, plain = _run(FOLLOW)
-    cut, logged = _run(FOLLOW + PythonLaw(nothing))
+    cut, logged = _run(FOLLOW + PythonLaw(careless) + PythonLaw(nothing))
     for one, other in zip(plain, logged, strict=True):
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b)
     np.testing.assert_array_equal(compiled.world.data.qpos, cut.world.data.qpos)
-    # It was called once a tick, with what the device measured.
+    # It was called once a tick, with what the device measured, although the law before it changed its own hand.
     hands = np.concatenate([block[0] for block in plain])
     np.testing.assert_array_equal(np.array(seen), hands[:, [0, 1, 2, 3, 8, 9, 10]])
 

@@ -41,6 +41,8 @@ class Law(ABC):
     by ``+``, ``-``, ``*``, ``/``, `gated`, `blended` and `limited`; each result is again a law, and s is a `Weight`.
     """
 
+    __array_ufunc__ = None  # an array times a field is refused, not an array of fields
+
     @abstractmethod
     def _compose(self) -> "Program":
         """The field as it is executed; called once, by `program`."""
@@ -324,7 +326,7 @@ class Program(Law):
         if self.walker_feeds:
             feed_walkers(self.fresh_walkers(), self.params, memory, hand.vector())
         for slot, function in self.python_feeds:
-            memory[slot : slot + 6] = function(hand)
+            memory[slot : slot + 6] = function(HandState.of(hand.vector()))
         stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
         for slot, _, haptic_map in self.map_feeds:
             first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT

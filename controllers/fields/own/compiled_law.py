@@ -73,11 +73,11 @@ class CompiledLaw(FunctionLaw):
 @cache
 def _kernel(function: Callable[..., Any], count: int) -> Kernel:
     """The function as a law's kernel; its parameters are `count` numbers, in the order of its arguments."""
-    compiled: Any = njit(error_model="numpy")(function)
     signature = (_HAND, *[_NUMBER] * count)
     try:
+        compiled: Any = njit(error_model="numpy")(function)
         compiled.compile(signature)
-    except Exception as error:  # NumbaError, and whatever the modules that the function uses raise
+    except Exception as error:  # NumbaError, TypeError of an object that is no function, what used modules raise
         at = re.findall(r'File "[^"]*", line (\d+)', str(error))
         where = f"in line {at[-1]}: " if at else ""
         raise ParameterError(

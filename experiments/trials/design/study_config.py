@@ -151,7 +151,7 @@ def read_toml(path: Path, what: str) -> dict[str, object]:
         If it cannot be read.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise StudyError(f"{path}: cannot be read ({error.strerror}); expected the TOML file of {what}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

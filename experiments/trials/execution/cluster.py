@@ -3,7 +3,7 @@
 import logging
 import socket
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from experiments.config.part import from_json
@@ -11,6 +11,7 @@ from experiments.config.run_config import RunConfig
 from experiments.trials.design.plan import trial_key
 from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.run_trial import Row, Task, perform_trial
+from sim.hardware.process_start import blocked_sigint
 from sim.recording.recorder import DiskFull
 
 # tasks queued for each thread of a worker: one more than for local threads, to cover the network latency
@@ -111,11 +112,10 @@ def local_cluster(workers: int) -> Generator[Cluster]:
         "distributed.scheduler.allowed-failures": MAX_WORKER_DEATHS, "distributed.worker.memory.terminate": False,
         "distributed.comm.timeouts.connect": _LOCAL_TIMEOUT, "distributed.comm.timeouts.tcp": _LOCAL_TIMEOUT,
     }  # fmt: skip
-    with (
-        dask.config.set(settings),  # pyright: ignore[reportPrivateImportUsage]
-        _start_processes(distributed, workers) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with dask.config.set(settings), ExitStack() as stack:  # pyright: ignore[reportPrivateImportUsage]
+        with blocked_sigint():  # Ctrl-C in a terminal reaches all its processes: it is this one that ends the workers
+            cluster = stack.enter_context(_start_processes(distributed, workers))
+            client = stack.enter_context(distributed.Client(cluster))
         yield Cluster(client, f"{workers} local workers")
 
 

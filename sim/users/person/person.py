@@ -1,6 +1,5 @@
 """Parameters of a simulated person at the stylus: arm, senses and motor system. Pure data; see also `population`."""
 
-import math
 from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
 
@@ -203,8 +202,7 @@ class Person:
             if option.name not in INTERVALS:
                 continue
             value, (least, most, unit, _) = getattr(self, option.name), INTERVALS[option.name]
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise SimError(f"{option.name} of person {self.name!r} is {value!r}; expected a finite number")
+            check_kind(f"{option.name} of person {self.name!r}", value, float)
             if not least <= value <= most:
                 expected = f"expected {least:g} to {most:g} {unit}".rstrip()
                 raise SimError(f"{option.name} of person {self.name!r} is {value:g}; {expected}")

@@ -1,5 +1,6 @@
 """Populations of simulated persons: seeded random draws, and named personas."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -52,9 +53,8 @@ def persona(name: str) -> Person:
     check_kind("name", name, str)
     if name in PERSONAS:
         return PERSONAS[name]
-    seed, _, place = name.partition(":")
-    if seed.isdecimal() and (place or "0").isdecimal() and int(place or "0") < _MAX_SIZE:
-        return _draw_person(int(seed), int(place or "0"))
+    if drawn := re.fullmatch(r"(\d{1,18})(?::(\d{1,6}))?", name):
+        return _draw_person(int(drawn[1]), int(drawn[2] or "0"))
     known = ", ".join(PERSONAS)
     raise SimError(f"no person {name!r}; there are {known}, or SEED:PLACE of a population, such as 7:3")
 

@@ -64,6 +64,19 @@ def test_kernel_calls_pose_and_jacobian_of_the_map() -> None:
     assert kernel_of(own, X, 0)[0].tolist() == pose.tolist()  # without the derivative
 
 
+def test_map_that_changes_its_argument_or_reuses_its_pose_has_the_same_derivative() -> None:
+    class Careless(Turned):
+        kept = np.empty(11)
+
+        def pose(self, x):
+            self.kept[:] = super().pose(x)
+            x[:] = 0.0
+            return self.kept
+
+    for given, expected in zip(kernel_of(Careless(), X.copy(), 9), kernel_of(Turned(), X, 9), strict=True):
+        np.testing.assert_array_equal(given, expected)
+
+
 def with_jacobian(jacobian: Callable[[np.ndarray], object]) -> HapticMap:
     """The map `Turned` with a given Jacobian."""
 

@@ -379,3 +379,5 @@ def test_configuration_of_every_mode_round_trips_through_its_file(mode: str, tmp
     file = tmp_path / "config.json"
     file.write_text(to_json(config))
     assert config_of_options(parse_command(["run", "--config", str(file)]).options) == config == load_config(file)
+    file.write_text(to_json(config), encoding="utf-8-sig")  # with the mark that editors on Windows put in front
+    assert load_config(file) == config

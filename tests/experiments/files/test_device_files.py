@@ -31,6 +31,8 @@ def test_files_of_identify_and_calibrate_are_read_back(tmp_path: Path) -> None:
     ):
         save_device(step(content), file)
         content = read_device_file(file)
+    file.write_text(file.read_text(encoding="utf-8"), encoding="utf-8-sig")  # by an editor on Windows
+    assert read_device_file(file) == content
     assert content["offset"]["margin"] == [1e-4, None, None]
     assert content["recordings"] == ["b"]
 

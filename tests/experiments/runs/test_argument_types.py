@@ -83,6 +83,8 @@ def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None
         (lambda: hvf.tune(SIM, SPACE, 3), "cost is 3; expected a function of a run"),  # pyright: ignore
         (lambda: hvf.tune(SIM, {"field.k_r": ("a", "b")}, len), "expected a sequence, each a number"),  # pyright: ignore
         (lambda: hvf.tune(SIM, SPACE, len, panel=(3,)), "expected a sequence, each User"),  # pyright: ignore
+        (lambda: np.ones(2) * SIM.field, "s is array([1., 1.]); expected a number"),
+        (lambda: hvf.circle(lap=1e10), "lap is 1e+10; expected at most 86400 s"),
         (lambda: hvf.Search(candidates=10**12), "candidates is 1000000000000; expected 1 to 1000000"),
         (lambda: hvf.Search(candidates=0), "candidates is 0; expected 1 to 1000000"),
         (lambda: hvf.Search(sampler="best"), "sampler is 'best'; expected one of tpe, cma-es, nsga-ii, random"),  # pyright: ignore

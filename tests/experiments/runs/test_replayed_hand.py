@@ -48,6 +48,12 @@ def test_replay_in_same_field_reproduces_motion_and_force(recorded: hvf.Run) -> 
     assert not again.ticks["user"].any()
 
 
+def test_replay_into_the_folder_that_it_replays_is_refused(recorded: hvf.Run) -> None:
+    with pytest.raises(hvf.HvfError, match=r"is the run whose hand is replayed.*; choose another record"):
+        replayed(recorded, 300.0).run(SECONDS, record=recorded.folder, overwrite=True)
+    assert recorded.ticks["t"].any()
+
+
 def test_replay_in_another_field_changes_only_the_force(recorded: hvf.Run) -> None:
     again = replayed(recorded, 100.0).run(SECONDS)
     np.testing.assert_array_equal(again.ticks["p"], recorded.ticks["p"])

@@ -95,6 +95,16 @@ def test_channels_of_an_unreferenced_run_can_be_read(sim: hvf.Simulation) -> Non
     assert sim.run(0.1).ticks["p"].shape == (100, 3)
 
 
+def test_run_in_a_relative_folder_is_read_from_any_working_directory(
+    sim: hvf.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = sim.run(0.1, record="mine")
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir("other")
+    assert run.ticks["p"].shape == (100, 3)
+
+
 def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Failing(hvf.HapticMap):
         def pose(self, x: np.ndarray) -> np.ndarray:

@@ -159,3 +159,18 @@ def test_law_equals_plain_numba_bit_for_bit():
     ]
     assert len(options[0]) > 10_000
     assert options[0] == options[1]
+
+
+def test_ctrl_c_while_llvm_emits_code_ends_the_compilation(monkeypatch: pytest.MonkeyPatch, capsys):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    def tenfold(x):
+        return 10 * x
+
+    with monkeypatch.context() as patched:
+        patched.setattr("llvmlite.binding.executionengine.string_at", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            njit(tenfold).compile((types.int64,))
+    assert capsys.readouterr().err == ""
+    assert njit(tenfold)(2) == 20

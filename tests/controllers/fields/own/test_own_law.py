@@ -36,6 +36,11 @@ def reading(hand):
         return file.read(), 0.0, 0.0
 
 
+class Springy:
+    def __call__(self, hand):
+        return hand.p
+
+
 def twisted(hand, k=0.2, d=0.01):
     """A moment towards the upright stylus, and a force while the switch is closed."""
     w, x, y, z = hand.q
@@ -120,6 +125,17 @@ def test_law_composes_with_builtin_and_python_laws():
         for part, most in ((total[:3], 3.0), (total[3:], 0.02)):
             part *= min(1.0, most / np.linalg.norm(part))
         np.testing.assert_allclose(np.concatenate(field.wrench(hand)), total, rtol=1e-12, atol=1e-15)
+
+
+def test_law_that_changes_the_hand_changes_it_for_itself_alone():
+    def careless(hand):
+        hand.p[:] = 5.0
+        return hand.p
+
+    hand = HandState.at([0.04, 0.01, 0.02])
+    both = law(careless) + law(floor) + law(smooth_floor)
+    np.testing.assert_array_equal(both.wrench(hand).force, (law(floor) + law(smooth_floor)).wrench(hand).force + 5.0)
+    assert hand.p.tolist() == [0.04, 0.01, 0.02]
 
 
 def test_compiled_loop_evaluates_law_every_tick():
@@ -269,6 +285,7 @@ def test_description_of_composed_field_lists_operations_and_laws():
             "cannot be compiled.* has no attribute 'nope'",
         ),
         (lambda: law(compiled=True)(reading), "cannot be compiled: The 'with"),
+        (lambda: law(compiled=True)(Springy()), "law Springy cannot be compiled: The decorated object is not a fun"),
         (lambda: law(compiled=True)(lambda hand: (unknown, 0, 0)), "cannot be compiled.*unknown"),  # noqa: F821
     ],
 )

@@ -168,6 +168,13 @@ def test_example_studies_can_be_planned(path: Path) -> None:
     assert plan_trials(parse_study(read_toml(path, "a study"), str(path)))
 
 
+def test_study_saved_on_windows_is_the_same(tmp_path: Path) -> None:
+    quick, file = next(path for path in EXAMPLES if path.stem == "quick"), tmp_path / "quick.toml"
+    with file.open("w", encoding="utf-8-sig", newline="\r\n") as windows:
+        windows.write(quick.read_text(encoding="utf-8"))
+    assert Study.load(file) == Study.load(quick)
+
+
 def test_invalid_toml_is_refused_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("name = ]\n", encoding="utf-8")
     with pytest.raises(StudyError, match="line 1"):

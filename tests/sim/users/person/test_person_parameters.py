@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from controllers.errors import ParameterError
 from sim.errors import SimError
 from sim.users.participant import Participant, tremor_filter
 from sim.users.person.body import arm_matrices, check_steps
@@ -47,9 +48,11 @@ def test_parameter_outside_its_interval_is_refused_with_what_is_expected(name: s
 
 
 def test_unknown_persona_or_invalid_population_is_refused() -> None:
-    for name in ("nobody", "7:x", "-1", "1:99999999999"):
+    for name in ("nobody", "7:x", "-1", "1:99999999999", "7" * 5000):
         with pytest.raises(SimError, match="median, expert"):
             persona(name)
+    with pytest.raises(ParameterError, match=r"mass of person .median. is 1000.*; expected a number"):
+        Person(mass=10**400)
     with pytest.raises(SimError, match="expected right or left"):
         Person(hand="both")  # pyright: ignore[reportArgumentType]
     for number, seed in ((0, 1), (3, -1)):
