@@ -40,7 +40,7 @@ class RunSummary:
     editing, performance : EditingSummary, PerformanceSummary or None
         In the modes that bend a curve, the part of the run in which it was bent, and that in which it was performed.
     trace : TraceSummary, ReplaySummary or None
-        How the hand traced the curve by itself, or moved as it was recorded, if it did.
+        How the hand moved by itself, or as it was recorded, if it did.
     oscillation : OscillationSummary or None
         Measured stability of the loop.
     arm : ArmSummary or None

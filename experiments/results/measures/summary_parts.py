@@ -130,7 +130,7 @@ class AnimationSummary:
 
 @dataclass(frozen=True)
 class TraceSummary:
-    """How a hand traced the curve by itself.
+    """How a hand moved that does not merely let itself be guided.
 
     Attributes
     ----------
@@ -145,8 +145,8 @@ class TraceSummary:
 
     def line(self) -> str:
         """Summary in a sentence."""
-        away = "" if self.deviation_rms_mm is None else f"within {self.deviation_rms_mm:.2f} mm RMS and "
-        return f"The hand traced the curve by itself, {away}with up to {self.peak_force:.1f} N."
+        away = "" if self.deviation_rms_mm is None else f"within {self.deviation_rms_mm:.2f} mm RMS of the curve and "
+        return f"The hand moved by itself, {away}with up to {self.peak_force:.1f} N."
 
 
 @dataclass(frozen=True)

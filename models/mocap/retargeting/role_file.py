@@ -88,6 +88,6 @@ def _check_order(path: Path, named: dict[str, int], motion: SourceMotion) -> Non
 
 def _read_toml(path: Path) -> dict[str, object]:
     try:
-        return tomllib.loads(read_text(path, _SIZE_LIMIT, "role file").decode("utf-8"))
+        return tomllib.loads(read_text(path, _SIZE_LIMIT, "role file").decode("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise MotionFileError(path, 0, f"is no TOML ({error})", 'lines such as left_thigh = "NAME"') from None

@@ -176,9 +176,9 @@ def test_tracing_hand_is_reported(tmp_path: Path) -> None:
     assert trace.deviation_rms_mm == pytest.approx(1e3 * np.sqrt(np.mean(settled**2)))
     assert trace.peak_force == pytest.approx(3.0)
     lines = replace(summary, trace=trace).lines()
-    assert any(line.startswith("The hand traced the curve by itself, within ") for line in lines)
+    assert any(line.startswith("The hand moved by itself, within ") for line in lines)
     brief = replace(trace, deviation_rms_mm=None)
-    assert brief.line() == "The hand traced the curve by itself, with up to 3.0 N."
+    assert brief.line() == "The hand moved by itself, with up to 3.0 N."
     assert not any("push" in line.lower() for line in lines)
 
 

@@ -29,9 +29,9 @@ def named_and_numbered(tmp_path):
     return path, bare, {role: numbers[joint] for role, joint in (report.taken | toes).items()}
 
 
-def write_role_file(roles, tmp_path):
+def write_role_file(roles, tmp_path, encoding="utf-8"):
     path = tmp_path / "roles.toml"
-    path.write_text("".join(f'{role} = "{joint}"\n' for role, joint in roles.items()))
+    path.write_text("".join(f'{role} = "{joint}"\n' for role, joint in roles.items()), encoding=encoding)
     return path
 
 
@@ -43,10 +43,10 @@ def test_role_file_gives_the_same_motion_as_joint_names(named_and_numbered, tmp_
     np.testing.assert_allclose(by_roles.poses, load(named).clip.poses, atol=1e-12)
 
 
-def test_role_file_may_omit_the_trunk_and_head(named_and_numbered, tmp_path):
+def test_role_file_with_a_byte_order_mark_may_omit_the_trunk_and_head(named_and_numbered, tmp_path):
     _, bare, roles = named_and_numbered
     limbs = {role: joint for role, joint in roles.items() if role.startswith(("left", "right"))}
-    report = load(bare, Hints(roles=write_role_file(limbs, tmp_path))).report
+    report = load(bare, Hints(roles=write_role_file(limbs, tmp_path, "utf-8-sig"))).report
     assert report.taken == {role: joint for role, joint in roles.items() if "toe" not in role and role != "head"}
     assert report.missing == ("head (follows chest)",)
 
