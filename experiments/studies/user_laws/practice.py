@@ -61,10 +61,12 @@ def practice(people: Sequence[Person], seed: int) -> Study:
 def endurance(people: Sequence[Person], seed: int) -> Study:
     """Endurance time of a hand against a force of the device, over that force as a share of its strength.
 
-    Measured with one person: strength and fatigue are fixed, and other differences between people matter little.
+    Measured with one person: strength and fatigue are fixed, and other differences between people matter little. She
+    trembles as she does, since a hand that is quite still for half a second looks like frozen encoders to the device,
+    which then lets go of her.
     """
     times, person = list[float](), people[0]
-    weak = replace(person, strength=STRENGTH, fatigue=FATIGUE, tremor=0.0)
+    weak = replace(person, strength=STRENGTH, fatigue=FATIGUE)
     for load in LOADS:
         seconds = 1.3 * 60.0 / FATIGUE * (1.0 - load) / load
         pushes = np.zeros((round(seconds / PERIOD), 3))

@@ -44,6 +44,12 @@ def test_low_variance_law_holds_on_one_fresh_panel(name: str) -> None:
 
 
 @pytest.mark.slow
+def test_device_holds_its_load_though_a_hand_hardly_moves() -> None:
+    # Without tremor the encoders seemed frozen to the device, which let go of this person, who never gave way.
+    assert all(np.isfinite(law.value) for law in user_laws(PEOPLE, 3003, ("endurance",))[0].laws)
+
+
+@pytest.mark.slow
 def test_table_and_figures_are_not_replaced_without_overwrite(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
