@@ -10,6 +10,7 @@ from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TR
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
+from controllers.haptic_map.lifting.arrangement_energy import PUSH_SPEED
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
@@ -21,9 +22,7 @@ from models.mocap.motion.clip import Clip
 from sim.reference.reference import make_reference, map_poses, reference_along
 
 _DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
-# [m] offset by a push on a lifted map, and [m/s] what a push along its curve adds to the speed: 2.5 N against 300 N/m
-# and 8 N s/m
-_PUSH_OFFSET, _PUSH_SPEED = 8e-3, 2.5 / 8.0
+_PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
 _PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
 _GRID_SIZE = 500  # points at which a curve's radius and speed are taken
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
@@ -91,7 +90,7 @@ def _pushed_phases(curve: Trajectory, push: Array, keeps_pace: bool) -> Array:
     points, velocities = curve.point(curve.start + grid), curve.velocity(curve.start + grid)
     radii, speeds = np.hypot(points[:, 0], points[:, 1]), np.linalg.norm(velocities, axis=1)
     outward = np.sum(points[:, :2] * velocities[:, :2], axis=1) / (radii * speeds)  # cosine of tangent and push
-    added = _PUSH_SPEED * outward / speeds
+    added = PUSH_SPEED * outward / speeds
     phases = np.zeros(len(push))
     for k, share in enumerate(push[:-1]):
         radius, extra = np.interp(phases[k], grid, radii), share * np.interp(phases[k], grid, added)
