@@ -3,7 +3,8 @@ r"""Energy of curves round the z axis with sites (r_i(θ), z_i(θ)), by the cont
 .. math:: E = \sum_{i<j} \Bigl\langle w\, \frac{(D_{ij} - T_{ij})^2}{\bar T^2}
           + \Bigl(1 - \frac{D_{ij}}{S_{ij}}\Bigr)_+^2 + v\, |q_i' - q_j'|^2 \Bigr\rangle
           + \sum_i \langle (1 + \dot\theta_i^4/\omega^4)\, |q_i''|^2
-          + (\gamma_i |q_i'|)^2 + limits \rangle, \qquad \gamma_i = \frac{u}{\dot\theta_i \bar r^2}
+          + \bigl(\tfrac{\omega_p}{\dot\theta_i}\, \gamma_i |q_i'|\bigr)^2 + limits \rangle,
+          \qquad \gamma_i = \frac{u}{\dot\theta_i \bar r^2}
 
 D is the distance of two sites at an angle, T = κ d the distance of the two poses there scaled to the size of the
 rectangle (multidimensional scaling, at every angle and smooth in it): a millimetre of hand motion then changes the
@@ -11,7 +12,8 @@ figure equally everywhere, so h_* is well conditioned. At a transition T falls t
 parallel; elsewhere S keeps them apart. The bending term grows with θ̇: where the radius changes, springs and filters
 track the tangential acceleration 2 θ̇² r' with an error, which shifts the hand's angle and with it the clip's phase. A
 push across a curve has a part along it where the curve slants: it changes the pace of the clip by γ |q'|, relative,
-with u the speed that it adds along itself and r̄ the radius in the middle of the rectangle. Slow curves are hence level.
+with u the speed that it adds along itself and r̄ the radius in the middle of the rectangle, and lasts for a share of the
+lap. Slow curves are hence level.
 `limits` penalises excessive speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the
 rectangle, hence so do the sites.
 
@@ -52,9 +54,9 @@ _MIN_DISTANCE_RATIO = 0.2
 # changes them by 0.3 mm, the bend weight by 0.4, the approach weight by 0.6. The median condition number of h_* half
 # way between two curves, 26.8, changes by 0.7, with the bend weight by 3.9.
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
-# Weight of the changes of pace. Of a kick of 7 s a push changes the pace by 147 % with 0, 21 % with 0.3 and 7 % with 1;
-# the figure, which has 12.8 % of body weight when it is not pushed, then has 17.5, 13.4 and 12.7 %.
-_PACE_WEIGHT = 1.0
+# [rad/s] ω_p. A push changes the pace of a captured kick of 7 s by 12 % instead of 147 %; with half of it by 28 %, with
+# twice by 4 %, and jump and backflip pass within 4.9 mm of each other instead of 4.3.
+_PACE_RATE = 0.7
 PUSH_SPEED = 2.5 / 8.0
 """Speed that a push of 2.5 N adds against a damping of 8 N s/m [m/s]."""
 # [rad/s] ω: a captured walk with a residual of 1.7 % of weight has 4.7 % on its curve, with ω = 3 rad/s 11 %
@@ -191,7 +193,7 @@ class Energy:
             pair = np.flatnonzero((i == min(first, second)) & (j == max(first, second)))
             self._parallel[:, pair] += (_TANGENT_WEIGHT * np.maximum(1.0 - 3.0 * near, 0.0) / _SLOPE_UNIT)[:, None]
         middle = 0.5 * (task.rectangle.r_min + task.rectangle.r_max)
-        self._slope_stiffness = _PACE_WEIGHT / N_ANGLES * (PUSH_SPEED / (task.rate * middle**2)) ** 2
+        self._slope_stiffness = (_PACE_RATE * PUSH_SPEED / (task.rate * middle) ** 2) ** 2 / N_ANGLES
         self._bend_stiffness = _BEND_WEIGHT / _SLOPE_UNIT * (1.0 + (task.rate / _BEND_RATE) ** 4)
 
     def __call__(self, flat: Array) -> Expansion:
