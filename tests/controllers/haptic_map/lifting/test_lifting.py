@@ -148,7 +148,7 @@ def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_th
     share = np.interp(transition.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
-    assert meeting.distance < 5e-3
+    assert meeting.distance < 6e-3  # 4.7 mm if curves may slant without a penalty
     assert np.degrees(meeting.slant) < 10.0
     assert found.after.separation >= ROOM.separation
     # Before the arrangement the curves were far apart there too.
@@ -290,18 +290,26 @@ def test_acceleration_limit_keeps_fast_clips_where_the_device_can_follow():
     assert 0.7 * unlimited < limited <= 0.8 * unlimited
 
 
-def test_faster_curves_bend_less():
+def test_slow_and_fast_curves_are_level():
     # Two motions that are alike twice a lap.
     lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, N_ANGLES, endpoint=False))
     distance = lap[:, None, None] * (1.0 - np.eye(2))
-    bends = list[float]()
-    for rate in (1.0, 3.0, 9.0):
+    bends, paces = list[float](), list[float]()
+    for rate in (0.5, 2.0, 3.0, 9.0):
         still = np.zeros((N_ANGLES, 2))
         task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
-        bends.append(np.ptp(arrange(task, np.random.default_rng(0))[0], axis=0).max())
-    assert bends[0] > 3e-3
-    assert bends[1] < 0.8 * bends[0]
-    assert bends[2] < 0.1 * bends[0]
+        controls = arrange(task, np.random.default_rng(0))[0]
+        bends.append(np.ptp(controls, axis=0).max())
+        sites, slopes, _ = evaluate_sites(controls)
+        # Of a push across the curves with 2.5 N, against 8 N s/m, relative to the speed θ̇ r of a level curve.
+        along = 2.5 / 8.0 * np.linalg.norm(slopes, axis=2) / sites[..., 0]
+        paces.append((along / (rate * sites[..., 0])).max())
+    slow, middle, faster, fast = bends
+    assert middle > 2e-3
+    assert faster < 0.8 * middle
+    assert max(slow, fast) < 0.1 * middle
+    assert max(paces) < 0.25
+    assert paces[0] < 0.02
 
 
 @pytest.mark.slow
