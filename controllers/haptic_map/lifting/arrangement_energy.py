@@ -56,7 +56,7 @@ _MIN_DISTANCE_RATIO = 0.2
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
 # [rad/s] ω_p. A push changes the pace of a captured kick of 7 s by 12 % instead of 147 %; with half of it by 40 %, with
 # twice by 4 %, and jump and backflip pass within 4.7 mm of each other instead of 4.3.
-_PACE_RATE = 0.7
+_PACE_RATE = 1.0
 PUSH_SPEED = 2.5 / 8.0
 """Speed that a push of 2.5 N adds against a damping of 8 N s/m [m/s]."""
 # [rad/s] ω: a captured walk with a residual of 1.7 % of weight has 4.7 % on its curve, with ω = 3 rad/s 11 %

@@ -148,7 +148,7 @@ def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_th
     share = np.interp(transition.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
-    assert meeting.distance < 6e-3  # 4.7 mm if curves may slant without a penalty
+    assert meeting.distance < 7e-3  # 3.1 mm if curves may slant without a penalty
     assert np.degrees(meeting.slant) < 10.0
     assert found.after.separation >= ROOM.separation
     # Before the arrangement the curves were far apart there too.
