@@ -54,8 +54,8 @@ _MIN_DISTANCE_RATIO = 0.2
 # changes them by 0.3 mm, the bend weight by 0.4, the approach weight by 0.6. The median condition number of h_* half
 # way between two curves, 26.8, changes by 0.7, with the bend weight by 3.9.
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
-# [rad/s] ω_p. A push changes the pace of a captured kick of 7 s by 12 % instead of 147 %; with half of it by 40 %, with
-# twice by 4 %, and jump and backflip pass within 4.7 mm of each other instead of 4.3.
+# [rad/s] ω_p. A push changes the pace of a captured kick of 7 s by 7 % instead of 236 %; with half of it by 24 %, with
+# twice by 2 %, and jump and backflip pass within 5.3 mm of each other instead of 4.4.
 _PACE_RATE = 1.0
 PUSH_SPEED = 2.5 / 8.0
 """Speed that a push of 2.5 N adds against a damping of 8 N s/m [m/s]."""

@@ -295,7 +295,7 @@ def test_slow_and_fast_curves_are_level():
     lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, N_ANGLES, endpoint=False))
     distance = lap[:, None, None] * (1.0 - np.eye(2))
     bends, paces = list[float](), list[float]()
-    for rate in (0.5, 2.0, 3.0, 9.0):
+    for rate in (0.5, 2.0, 4.0, 9.0):
         still = np.zeros((N_ANGLES, 2))
         task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
         controls = arrange(task, np.random.default_rng(0))[0]
@@ -305,11 +305,11 @@ def test_slow_and_fast_curves_are_level():
         along = 2.5 / 8.0 * np.linalg.norm(slopes, axis=2) / sites[..., 0]
         paces.append((along / (rate * sites[..., 0])).max())
     slow, middle, faster, fast = bends
-    assert middle > 2e-3
-    assert faster < 0.8 * middle
+    assert middle > 1e-3
+    assert faster < 0.5 * middle
     assert max(slow, fast) < 0.1 * middle
-    assert max(paces) < 0.25
-    assert paces[0] < 0.02
+    assert max(paces) < 0.2
+    assert paces[0] < 0.01
 
 
 @pytest.mark.slow
