@@ -23,7 +23,7 @@ from sim.reference.reference import make_reference, map_poses, reference_along
 
 _DOMAIN_FRACTION = 0.17  # offset by a push as a share of the domain: 2.5 N against 300 N/m, over 50 mm
 _PUSH_OFFSET = 8e-3  # [m] offset by a push on a lifted map: 2.5 N against 300 N/m
-_PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] between pushes, and rise time of a push
+_PUSH_INTERVAL, _PUSH_TIME = 1.7, 0.15  # [s] half the duration of a push, and its rise time
 _GRID_SIZE = 500  # points at which a curve's radius and speed are taken
 _ORDER = (0, 1, 2, 0, 2, 1, 0)  # of the three rivers: each change from one to another occurs once
 _DWELL_TIME, _TRANSFER_TIME = 5.5, 0.3  # [s] on a river, enough for a gate and the transition; [s] to the next river
@@ -41,15 +41,25 @@ def poses_about_circle(haptic_map: Cylindrical | Composite, r: Array | float, an
     return map_poses(haptic_map, stylus_path(np.stack(points, axis=-1)))
 
 
-def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bool, seconds: float) -> Clip:
+def tour_duration(lap: float) -> float:
+    """Duration of `tour_of_domain` [s]: two laps at least."""
+    return max(TRIAL_SECONDS, 2.0 * lap)
+
+
+def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Clip:
     """The animation of a hand that tours the domain of a map from its middle, with pushes outwards and inwards.
 
     The hand wanders at constant angular speed. A push does not change the speed along the path that the field imposes,
     so a hand pushed from radius R to r goes round at R/r of its angular speed, as in FOLLOW; with a `parallel` flow
-    (`Follow.parallel`) its angular speed does not change. The tour takes `seconds`, and goes on for one more.
+    (`Follow.parallel`) its angular speed does not change. Where the tour has two laps only, a lap has an odd number of
+    pushes, so that each part of the clips is met with a push outwards in one lap and inwards in the other. The tour
+    takes `tour_duration`, and goes on for one second more.
     """
+    seconds = tour_duration(lap)
     times = _times(seconds)
-    turn, pushed = 2.0 * np.pi * times / seconds, _DOMAIN_FRACTION * _push_profile(times)
+    odd = 2 * round(0.5 * (lap / (2.0 * _PUSH_INTERVAL) - 1.0)) + 1
+    interval = 0.5 * lap / odd if seconds > TRIAL_SECONDS else _PUSH_INTERVAL
+    turn, pushed = 2.0 * np.pi * times / seconds, _DOMAIN_FRACTION * _push_profile(times, interval)
     shares = np.stack([0.5 + 0.5 * np.sin(2.0 * turn) + pushed, 0.5 + 0.5 * np.sin(3.0 * turn)])
     low, high = domain(haptic_map).T
     r, z = low[:, None] + np.clip(shares, 0.0, 1.0) * (high - low)[:, None]
@@ -67,7 +77,7 @@ def tour_along_curve(haptic_map: Lifted, curve: Trajectory, keeps_pace: bool) ->
     and speeds the hand up or slows it down in either flow.
     """
     times = _times(TRIAL_SECONDS)
-    push = _push_profile(np.maximum(times - _PUSH_INTERVAL, 0.0))
+    push = _push_profile(np.maximum(times - _PUSH_INTERVAL, 0.0), _PUSH_INTERVAL)
     points = curve.point(curve.start + _pushed_phases(curve, push, keeps_pace))
     points[:, :2] *= 1.0 + (_PUSH_OFFSET * push / np.hypot(points[:, 0], points[:, 1]))[:, None]
     return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "pushed")
@@ -77,11 +87,11 @@ def _times(seconds: float) -> Array:
     return np.arange(round((seconds + 1.0) * FPS)) / FPS
 
 
-def _push_profile(times: Array) -> Array:
-    """Offset of a hand that is pushed out (1) and in (-1) at times (n,) [s], with rests between."""
-    phase = times / _PUSH_INTERVAL % 2.0
-    ramp = np.minimum(phase, 2.0 - phase) * _PUSH_INTERVAL / _PUSH_TIME
-    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * _PUSH_INTERVAL) % 2.0 == 0.0, 1.0, -1.0))
+def _push_profile(times: Array, interval: float) -> Array:
+    """Offset of a hand that is pushed out (1) and in (-1) in turn at times (n,), for twice an interval each [s]."""
+    phase = times / interval % 2.0
+    ramp = np.minimum(phase, 2.0 - phase) * interval / _PUSH_TIME
+    return np.asarray(cubic_steps(ramp) * np.where(times // (2.0 * interval) % 2.0 == 0.0, 1.0, -1.0))
 
 
 def _pushed_phases(curve: Trajectory, push: Array, keeps_pace: bool) -> Array:

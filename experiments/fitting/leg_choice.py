@@ -23,7 +23,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.fitting.hand_tours import domain, tour_along_curve, tour_of_domain
+from experiments.fitting.hand_tours import domain, tour_along_curve, tour_duration, tour_of_domain
 from experiments.fitting.verdict import TRIAL_SECONDS, Trial, Verdict
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
@@ -38,10 +38,9 @@ Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
 def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
-    """The trial in which the physical figure follows a map about a circle for 20 s, or a lap if that is longer."""
-    seconds = max(TRIAL_SECONDS, lap)
+    """The trial in which the physical figure follows a map about a circle for 20 s, or two laps if that is longer."""
     made_of = (haptic_map.compiled().params, np.array([lap, parallel, *domain(haptic_map).ravel()]))
-    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel, seconds), seconds, made_of)
+    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), tour_duration(lap), made_of)
 
 
 def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:

@@ -14,6 +14,9 @@ MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS = 0.05, 0.12
 MAX_SEAM_VELOCITY_JUMP = 0.3  # difference of the velocities at a closed clip's ends [rad/s, m/s]
 MAX_END_SPEED = 0.3  # RMS joint velocity at an open clip's ends [rad/s]
 MAX_LIMIT_EXCESS = np.deg2rad(1.0)  # over a joint's range: Euler angles and rotation vectors differ by this near limits
+# How much deeper parts of the body may be in each other than in the capture [m], half the radius of an ankle. Arms that
+# hang, or hands on hips, are up to 9 cm deep in captures: the figure has one girth.
+MAX_ADDED_DEPTH = 0.02
 MAX_FLIGHT_ACCELERATION_ERROR = 1.5  # RMS difference of the centre of mass' acceleration from gravity in flight [m/s²]
 
 

@@ -8,7 +8,8 @@ from geometry.arrays import Array, rms
 from geometry.quaternions import rotated
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.bounds import exceeding_text
+from models.mocap.motion.interpenetration import PARTS, depths
+from models.mocap.preparation.bounds import MAX_ADDED_DEPTH, exceeding_text
 from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.poses import resampled
 
@@ -41,6 +42,25 @@ class WorstJoint(NamedTuple):
     when: float
 
 
+class Intrusion(NamedTuple):
+    """Where one part of the body is deepest in another.
+
+    Attributes
+    ----------
+    parts : tuple of (str, str)
+        One of `models.mocap.motion.interpenetration.PARTS`.
+    depth, captured : float
+        How far they would have to be moved apart in the clip, and in the capture [m].
+    when : float
+        Time in the clip [s].
+    """
+
+    parts: tuple[str, str]
+    depth: float
+    captured: float
+    when: float
+
+
 class Fidelity(NamedTuple):
     """Distance of a clip from its capture.
 
@@ -54,12 +74,15 @@ class Fidelity(NamedTuple):
         The five joints that differ most, the largest first.
     gait : bool
         Whether the clip is a gait, for which the bound is tighter.
+    intrusions : tuple of Intrusion
+        Parts of the body that are deeper in each other than in the capture by more than `MAX_ADDED_DEPTH`.
     """
 
     joints: float
     root: float
     extremes: tuple[WorstJoint, ...]
     gait: bool
+    intrusions: tuple[Intrusion, ...]
 
     def faults(self) -> tuple[str, ...]:
         """Measures that exceed their bounds, a line each."""
@@ -70,6 +93,9 @@ class Fidelity(NamedTuple):
         if self.root > MAX_ROOT_DISTANCE:
             far = exceeding_text(100 * self.root, 100 * MAX_ROOT_DISTANCE)
             found.append(f"the root is {far} cm RMS from the capture; {100 * MAX_ROOT_DISTANCE:.0f} at most")
+        for (first, second), depth, captured, when in self.intrusions:
+            deep = f"the {first} goes {100 * depth:.1f} cm into the {second} at {when:.2f} s"
+            found.append(f"{deep}, {100 * captured:.1f} in the capture; {100 * MAX_ADDED_DEPTH:.0f} more at most")
         return tuple(found)
 
     def line(self) -> str:
@@ -111,7 +137,17 @@ def fidelity(clip: Clip, captured: Clip, part: LoopedClip, pace: float) -> Fidel
         tuple(WorstJoint(JOINTS[k], float(angles[:, k].max()), float(instants[k])) for k in largest),
         clip.closes() and not clip.turns_over
         and bool(np.hypot(clip.displacement.x, clip.displacement.y) > _MIN_GAIT_TRAVEL),
+        _intrusions(clip, captured),
     )  # fmt: skip
+
+
+def _intrusions(clip: Clip, captured: Clip) -> tuple[Intrusion, ...]:
+    """Parts that are deeper in each other in the whole clip than anywhere in the capture, by more than the bound."""
+    found, most = depths(clip.poses), depths(captured.poses).max(axis=0)
+    rows = zip(
+        PARTS, found.max(axis=0).tolist(), most.tolist(), (found.argmax(axis=0) / clip.fps).tolist(), strict=True
+    )
+    return tuple(Intrusion(*row) for row in rows if row[1] > row[2] + MAX_ADDED_DEPTH)
 
 
 def _root_distances(clip_poses: Array, capture_poses: Array) -> Array:

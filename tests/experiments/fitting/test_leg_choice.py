@@ -104,7 +104,7 @@ def test_trial_hand_covers_the_whole_map(
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
     monkeypatch.setattr(hand_tours, "map_poses", record_points)
-    tour_of_domain(maps[1], LAP, parallel, 20.0)
+    tour_of_domain(maps[1], LAP, parallel)
     x, y, z = places[0][:, :3].T
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
     assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
@@ -115,8 +115,26 @@ def test_trial_hand_covers_the_whole_map(
     assert np.median(pace) == pytest.approx(1.0, abs=0.05) or np.mean(pace) == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(("lap", "seconds"), [(LAP, 20.0), (30.0, 30.0)])
-def test_trial_takes_a_whole_lap(lap: float, seconds: float, maps: list[Cylindrical]) -> None:
+@pytest.mark.parametrize("lap", [10.6, 13.6, 22.4, 30.0])
+def test_trial_of_a_long_lap_meets_each_part_with_a_push_outwards_and_inwards(
+    lap: float, maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places: list[np.ndarray] = []
+
+    def record_points(haptic_map: Cylindrical, points: np.ndarray) -> np.ndarray:
+        places.append(points)
+        return np.tile(embedded("walk").poses[0], (len(points), 1))
+
+    monkeypatch.setattr(hand_tours, "map_poses", record_points)
+    tour_of_domain(maps[1], lap, parallel=False)
+    turns = np.unwrap(np.arctan2(places[0][:, 1], places[0][:, 0])) / (2.0 * np.pi)
+    pace, part = np.diff(turns) * 120.0 * lap, (turns[:-1] * 40.0).astype(int) % 40
+    met = [pace[part == k].min() < 0.9 and pace[part == k].max() > 1.1 for k in range(40)]
+    assert np.mean(met) > 0.8  # but where one push follows the other
+
+
+@pytest.mark.parametrize(("lap", "seconds"), [(LAP, 20.0), (30.0, 60.0)])
+def test_trial_takes_two_laps(lap: float, seconds: float, maps: list[Cylindrical]) -> None:
     trial = trial_of(maps[1], lap, False)
     assert trial.seconds == seconds
     assert trial.show().duration > seconds

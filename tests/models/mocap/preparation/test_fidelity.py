@@ -83,8 +83,26 @@ def test_lap_in_which_the_body_turns_over_is_no_gait(walk):
     assert not fidelity(cartwheel, cartwheel, as_one_cycle(cartwheel), 1.0).gait
 
 
+def test_arm_that_is_deeper_in_the_trunk_than_in_the_capture_is_reported(walk):
+    poses = walk.poses.copy()
+    for joint, axis, angle in (("left_shoulder", 1, 90.0), ("left_elbow", 2, -90.0)):
+        columns = slice(7 + 4 * JOINTS.index(joint), 11 + 4 * JOINTS.index(joint))
+        poses[30:40, columns] = quaternions.about_axis(axis, np.deg2rad(angle))
+        if joint == "left_shoulder":
+            lowered = quaternions.about_axis(0, np.deg2rad(-80.0))
+            poses[30:40, columns] = quaternions.product(lowered, poses[30:40, columns])
+    folded = Clip(poses, walk.fps, "folded")
+    (found,) = fidelity(folded, walk, as_one_cycle(walk), 1.0).intrusions
+    assert found.parts == ("left arm", "trunk")
+    assert found.depth > 0.1
+    assert found.captured == 0.0
+    assert 30 / 120 <= found.when < 40 / 120
+    assert "into the trunk at 0.2" in fidelity(folded, walk, as_one_cycle(walk), 1.0).faults()[-1]
+    assert fidelity(folded, folded, as_one_cycle(walk), 1.0).intrusions == ()
+
+
 def test_fault_message_has_enough_digits_to_differ_from_the_bound():
-    result = Fidelity(np.deg2rad(3.0004), 0.0512, (), gait=True)
+    result = Fidelity(np.deg2rad(3.0004), 0.0512, (), gait=True, intrusions=())
     assert result.faults() == (
         "joints are 3.0004° RMS from the capture; 3 at most",
         "the root is 5.1 cm RMS from the capture; 5 at most",
