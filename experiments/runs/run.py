@@ -26,8 +26,8 @@ from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
+from geometry.whole_files import write_text
 from models.mocap.readers.own_bvh import write_bvh_blocks
-from sim.compilation.whole_files import write_text
 from sim.loop.channels import groups, record_into, shown_configuration
 from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog

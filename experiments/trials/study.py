@@ -24,7 +24,7 @@ from experiments.trials.execution.drive import check_writable, compile_and_make_
 from experiments.trials.execution.executors import executor
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from experiments.trials.trial.run_trial import Row
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 

@@ -24,7 +24,7 @@ from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, best_candidate, distributions_of, search, signs_of, storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
 CERTIFICATE = "certificate"

@@ -16,7 +16,7 @@ from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
 from experiments.setups.session import default_poses
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import peak_memory_mb

@@ -20,7 +20,7 @@ from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, TrialLog
 from experiments.trials.trial.run_trial import MapCache, run_recorded
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
 
@@ -207,7 +207,7 @@ def write_report(
     write_text(path, _page(study, text, said, found, plots, counts, shown, provenance))
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
-    pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)
+    write_text(path.with_name(_CONTRASTS_FILE), pd.DataFrame.from_records(rows, columns=columns).to_csv(index=False))
     return found, said
 
 
