@@ -185,6 +185,9 @@ def _existing_certificate(out: Path, inputs: Mapping[str, object]) -> Certificat
 
 def _write_certificate(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
+    if (out / CERTIFICATE).exists():
+        for name in (PLOT, REGION_PLOT, FLIGHTS_PLOT, OPTIONS):
+            (out / name).unlink(missing_ok=True)
     for file, (figure, _) in plots.items():
         save_figure(figure, out / file, dpi=150)
     shown = {file: shows for file, (_, shows) in plots.items()}
