@@ -17,6 +17,7 @@ import tyro
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile, RobotArm
 from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates_rivers
+from experiments.config.paths import load_config
 from experiments.config.run_config import (
     LEAD_WITHOUT_FIGURE,
     NO_SEED,
@@ -28,7 +29,6 @@ from experiments.config.run_config import (
     Replay,
     RunConfig,
     User,
-    load_config,
     meaningless_option_error,
     meaningless_options,
 )
@@ -275,7 +275,7 @@ def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any
     return name, Annotated[kind, shown], field(default=default)
 
 
-CONFIG_HELP = "A configuration in a JSON file; other options change it."
+CONFIG_HELP = "A configuration in a JSON file, from whose folder its relative paths start; other options change it."
 
 
 def _options() -> Iterator[tuple[str, Any, Any]]:

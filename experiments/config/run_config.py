@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any, Literal, cast, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
@@ -11,7 +10,7 @@ from controllers.errors import ParameterError
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.maps import Cylindrical, Led, Map, RobotArm
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
-from experiments.config.part import above, at_least, from_file, part, whole_number
+from experiments.config.part import above, at_least, part, whole_number
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
@@ -342,8 +341,3 @@ class RunConfig:
             idle = ("kind", *meaningless_options("robot", leads=False))
             held["figure"] = {name: value for name, value in held["figure"].items() if name not in idle}
         return held
-
-
-def load_config(path: Path) -> RunConfig:
-    """The configuration in a JSON file; see `experiments.config.part.from_file`."""
-    return from_file(RunConfig, path)

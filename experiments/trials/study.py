@@ -13,6 +13,7 @@ from controllers.checks import check_field_types, check_kind
 from experiments.certify.cached_stability import cached_stability
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_json
+from experiments.config.paths import relative_to
 from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
@@ -91,7 +92,7 @@ class Study:
             If it cannot be read, or contains an unknown entry.
         """
         file = given_path("path", path)
-        config = parse_study(read_toml(file, "a study"), str(file))
+        config = parse_study(read_toml(file, "a study"), str(file)).with_paths(relative_to(file.parent))
         return Study(config, file.read_text(encoding="utf-8-sig"))
 
     @staticmethod

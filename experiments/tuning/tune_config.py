@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -11,6 +12,7 @@ from controllers.errors import ParameterError
 from experiments.config.keywords import to_keywords
 from experiments.config.options import run_config
 from experiments.config.part import above, at_least, from_dict, part, whole_number
+from experiments.config.paths import relative_to, with_paths_of_options
 from experiments.config.run_config import RunConfig
 from experiments.trials.design.study_config import MAX_TRIAL_DURATION, StudyError, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
@@ -151,6 +153,7 @@ def read_tuning(path: Path) -> TuneConfig:
         If it cannot be read, or contradicts itself.
     """
     config = from_dict(TuneConfig, cast(Mapping[str, Any], read_toml(path, "a tuning")), str(path))
+    config = replace(config, run=with_paths_of_options(config.run, relative_to(path.parent)))
     check_tuning(config)
     return config
 

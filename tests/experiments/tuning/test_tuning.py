@@ -14,7 +14,7 @@ from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.config.options import run_config
-from experiments.config.run_config import load_config
+from experiments.config.paths import load_config
 from experiments.trials.design.study_config import StudyError, Where
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.executors import Threads
