@@ -85,5 +85,5 @@ def test_trial_ends_at_the_slip_and_refuses_a_device_that_lets_go() -> None:
     assert np.linalg.norm(slipped.p[-2:], axis=1) == pytest.approx(0.02, abs=2e-3)
     assert trial(person, still, 1.0, 1, np.zeros(3), end=End(slip=0.02)).t[-1] == pytest.approx(1.0)
     pushes[500] = np.nan
-    with pytest.raises(SimError, match="let go of a person after 0.500 s of a trial: the field requested a force"):
+    with pytest.raises(SimError, match=r"let go of a person after 0\.500 s of a trial: the field requested a force"):
         trial(person, still, 3.0, 1, np.zeros(3), pushes)
