@@ -56,7 +56,7 @@ class Take:
         servo = engine.session.servo
         static = engine.session.static() | {"live": LIVE}
         config = to_dict(engine.config)
-        self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo), static)
+        self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo, engine.world), static)
         self._record_logs = record_into(self._recorder, servo, engine.world)
         self._handled_spans: list[tuple[float, float]] = []
         self._tick_count = 0
