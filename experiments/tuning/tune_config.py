@@ -21,6 +21,9 @@ from sim.users.person.population import population
 MARGIN = "margin"
 """Objective that is not a measure of trials: the certificate's margin (critical k_r)/k_r − 1, to be maximised."""
 
+Sampler = Literal["tpe", "cma-es", "nsga-ii", "random"]
+"""Search methods of Optuna; `experiments.tuning.search.sampler_of` makes them."""
+
 
 @part
 class Range:
@@ -67,7 +70,7 @@ class TuneConfig:
         Simulated time of a trial [s].
     candidates : int
         Number of candidates to simulate.
-    sampler : {"tpe", "cma-es", "nsga-ii", "random"}
+    sampler : Sampler
         Sampler that proposes them.
     prune : bool
         Give up a candidate that is worse than the median after part of the panel; with one objective only.
@@ -92,7 +95,7 @@ class TuneConfig:
     repetitions: int = whole_number(1, default=1)
     seconds: float = above(0.0, default=6.0, unit="s", most=MAX_TRIAL_DURATION)
     candidates: int = whole_number(1, default=40)
-    sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
+    sampler: Sampler = "tpe"
     prune: bool = True
     least_margin: float = at_least(0.0, default=0.0)
     allow_unknown: bool = False
