@@ -69,7 +69,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         command = parse_command(words)
         if signal.getsignal(signal.SIGINT) is startup.stop_early:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            startup.handle_interrupts()
         import mujoco  # imported late: help and error messages do not need it
 
         # MuJoCo would print a warning and write it to MUJOCO_LOG.TXT in the user's folder; a run's summary counts them.

@@ -82,10 +82,14 @@ def fit_to_lap(loops: Sequence[Loop], lap: float | None = None, apart: bool = Fa
 def _best_repeat_count(durations: Array, lap: float) -> int:
     """Number of repeats of durations [s] (n,) that minimises the worst mismatch with a lap [s]."""
     logs = np.log(durations / lap)
-    first = max(1, int(np.exp(-logs.max())))
-    ways = np.arange(first, int(np.exp(-logs.min())) + 2)
-    faster = np.log(ways)[:, None] + logs
-    return int(ways[np.maximum(-faster, _FASTER_COST * faster).max(axis=1).argmin()])
+    slowest, fastest = float(logs.min()), float(logs.max())
+    # Convex in log k: least where the slowest is as much too slow as the fastest is too fast, or beside it.
+    fewer = max(1, int(np.exp(-(slowest + _FASTER_COST * fastest) / (1.0 + _FASTER_COST))))
+
+    def mismatch(count: int) -> float:
+        return max(-(np.log(count) + slowest), _FASTER_COST * (np.log(count) + fastest))
+
+    return min(fewer, fewer + 1, key=mismatch)
 
 
 def natural_lap(loops: Sequence[Loop], apart: bool = False) -> float:

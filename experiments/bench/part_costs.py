@@ -111,7 +111,9 @@ def _processor_time(seconds: float, recorded: bool) -> float:
             begin = time.process_time()
             Loop(session.servo, session.world).run(seconds)
             return time.process_time() - begin
-        with Recorder(Path(folder) / "run.h5", {}, 1, groups(session.servo), session.static()) as recorder:
+        with Recorder(
+            Path(folder) / "run.h5", {}, 1, groups(session.servo, session.world), session.static()
+        ) as recorder:
             begin = time.process_time()
             Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(seconds)
             recorder.flush()

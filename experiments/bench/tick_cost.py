@@ -15,7 +15,7 @@ from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import FrameLog, TickLog, run_block
 from sim.world.world import FigureKind
 

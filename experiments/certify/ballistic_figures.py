@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from controllers.certificates.flight.ballistic import FlightJudgement
 from controllers.certificates.flight.flight_fit import fit_free_fall
+from experiments.files.figure_files import save_figure
 from experiments.flights.ballistics import ClipBallistics, FlightTrial, clip_ballistics, fly
 from models.mocap.library import embedded, load_clip
 
@@ -86,7 +87,7 @@ def main(folder: Path, mocap: Path) -> None:
         **{f"CMU {name}": load_clip(mocap / "cmu_amc" / f"{name}.amc") for name in ("02_04", "16_09")},
     }
     cases = [flown(name, clip_ballistics(clip)) for name, clip in clips.items()]
-    rates_figure(cases).savefig(folder / "ballistics.png", dpi=110)
+    save_figure(rates_figure(cases), folder / "ballistics.png", dpi=110)
     print(rates_table(cases))
 
 

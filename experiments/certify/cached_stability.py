@@ -11,8 +11,8 @@ from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
 from experiments.setups.certified_law import governor_drag, uncertified_parts
 from experiments.setups.parts.defaults import resolved
+from geometry.whole_files import atomic_file
 from sim.compilation.sources import results_folder
-from sim.compilation.whole_files import atomic_file
 
 _LEADING_REASON = "leading is certified per regime, for the led clip: hvf certify --mode lead"
 

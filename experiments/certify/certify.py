@@ -34,15 +34,16 @@ from experiments.config.modes import Lead, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.files.certificate_files import OPTIONS, clip_inputs, read_certificate
 from experiments.files.device_files import linkage_of
+from experiments.files.figure_files import save_figure
 from experiments.files.json_text import json_text
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, uncertified_parts
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.defaults import resolved
+from geometry.whole_files import write_text
 from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.library import embedded_names, load
 from models.mocap.motion.clip import Clip
-from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 
 CERTIFICATE, PAGE = "certificate.json", "certificate.html"
@@ -184,8 +185,11 @@ def _existing_certificate(out: Path, inputs: Mapping[str, object]) -> Certificat
 
 def _write_certificate(certificate: Certificate, plots: Mapping[str, tuple[Figure, str]], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
+    if (out / CERTIFICATE).exists():
+        for name in (PLOT, REGION_PLOT, FLIGHTS_PLOT, OPTIONS):
+            (out / name).unlink(missing_ok=True)
     for file, (figure, _) in plots.items():
-        figure.savefig(out / file, dpi=150)
+        save_figure(figure, out / file, dpi=150)
     shown = {file: shows for file, (_, shows) in plots.items()}
     write_text(out / PAGE, certificate_page(certificate, shown))
     text = json.dumps(certificate.to_json(), indent=2, allow_nan=False) + "\n"

@@ -18,6 +18,7 @@ from experiments.config.part import above, at_least, from_json, part
 from experiments.config.run_config import RunConfig
 from experiments.console.output import Json, say
 from experiments.console.progress import working
+from geometry.whole_files import write_text
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
@@ -140,7 +141,8 @@ class Command:
                     config, folder, self.delay, self._hand_range(), self.hand_push, clips, self._criteria()
                 )
         options = replace(self, out=None, overwrite=False, json=False)
-        (folder / COMMAND_FILE).write_bytes(TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True))
+        text = TypeAdapter(Command).dump_json(options, indent=2, exclude_defaults=True).decode()
+        write_text(folder / COMMAND_FILE, text)
         return certificate
 
     def _original_command(self, file: Path) -> "Command":

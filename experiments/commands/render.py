@@ -42,7 +42,8 @@ class Command:
     def __call__(self) -> int:
         """Render."""
         from experiments.render.film import Film, render
+        from experiments.results.folder import FILM
 
         film = Film(self.show, self.camera, self.ghost, self.start, self.seconds, self.width, self.height, self.fps)
-        say(render(self.folder, self.out or self.folder / "film.mp4", film, self.gif, self.overwrite), self.json)
+        say(render(self.folder, self.out or self.folder / FILM, film, self.gif, self.overwrite), self.json)
         return 0

@@ -17,18 +17,19 @@ import tyro
 from controllers.errors import ParameterError
 from experiments.config.maps import MAP_SUFFIX, MAPS, Circle, Led, MapFile, RobotArm
 from experiments.config.modes import MODES, NO_DRAG, JointWalls, OrientationMoment, Rivers, SpeedGovernor, gates_rivers
+from experiments.config.paths import load_config
 from experiments.config.run_config import (
     LEAD_WITHOUT_FIGURE,
     NO_SEED,
     PERSON_INTENTS,
     Clock,
+    Does,
     Figure,
     FigureKind,
     Phantom,
     Replay,
     RunConfig,
     User,
-    load_config,
     meaningless_option_error,
     meaningless_options,
 )
@@ -37,7 +38,7 @@ from sim.users.person.population import PERSONAS, persona
 OPTIONAL_PARTS = {"orientation": OrientationMoment, "governor": SpeedGovernor, "walls": JointWalls}
 """Optional parts of a mode: an option of its name switches one on, or any of its numbers where those default to 0."""
 _SWITCHES = ("governor", "walls")
-_USER_KINDS = ("relaxed", "trace", "push", "turn", *PERSON_INTENTS)
+_USER_KINDS = tuple(kind for kind in get_args(Does) if kind != "lead")
 _NON_OPTIONS = {"kind", "around", "does", "pushes", "turns", "grabs", "file", *OPTIONAL_PARTS}
 _HAND_OPTIONS = {"user", "person", "pushes", "turns", "grabs"}
 
@@ -275,16 +276,16 @@ def option(name: str, kind: Any, text: str, default: Any) -> tuple[str, Any, Any
     return name, Annotated[kind, shown], field(default=default)
 
 
-CONFIG_HELP = "A configuration in a JSON file; other options change it."
+CONFIG_HELP = "A configuration in a JSON file, from whose folder its relative paths start; other options change it."
 
 
 def _options() -> Iterator[tuple[str, Any, Any]]:
     """Fields of the options' dataclass."""
-    top = parameters(RunConfig)
+    top, needs = parameters(RunConfig), ", ".join(PERSON_INTENTS) + " need"
     yield option("config", Path | None, CONFIG_HELP, None)
     yield option("mode", str, "Field of force: " + ", ".join(_parts_by_kind(MODES)) + ".", "")
     yield option("map", str, "Haptic map: cylindrical, composite, rivers, robot-arm, or a map's file (.npz).", "")
-    yield option("user", str, "The simulated hand: " + ", ".join(_USER_KINDS) + "; the last five need a person.", "")
+    yield option("user", str, f"The simulated hand: {', '.join(_USER_KINDS)}; {needs} a person.", "")
     yield option("person", str, "Whose hand it is: " + ", ".join(PERSONAS) + ", or SEED:PLACE of a population.", "")
     yield option("figure", str, "The figure: physical, kinematic (not in the physics), or none.", "")
     yield option("replay", str, "Folder of a run whose hand is replayed: it moves as recorded, whatever the force.", "")

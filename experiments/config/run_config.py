@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any, Literal, cast, get_args
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer
@@ -11,15 +10,20 @@ from controllers.errors import ParameterError
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.maps import Cylindrical, Led, Map, RobotArm
 from experiments.config.modes import Follow, Lead, Mode, StretchThenFollow
-from experiments.config.part import above, at_least, from_file, part, whole_number
+from experiments.config.part import above, at_least, part, whole_number
 from models.humanoid.skeleton import DEFAULT_MASS, DEFAULT_STATURE
 from models.world.scene import SceneConfig
 from sim.body.figure_state import FigureGains
 from sim.users.hand.actions import Grab, Push, Turn
+from sim.users.intents import ChangeOver, CutCorner, Exaggerate, GetLost, Resist
+from sim.users.intents.intent import PersonIntent
 from sim.users.person.person import Person
 from sim.world.world import BodyKind, FigureKind
 
-PERSON_INTENTS = ("exaggerate", "cut", "change", "resist", "lost")
+Does = Literal["relaxed", "trace", "push", "turn", "lead", "exaggerate", "cut", "change", "resist", "lost"]
+PERSON_INTENTS: Mapping[Does, PersonIntent] = {
+    "exaggerate": Exaggerate(), "cut": CutCorner(), "change": ChangeOver(), "resist": Resist(), "lost": GetLost(),
+}  # fmt: skip
 """What only a person can do, since it takes sight and touch."""
 
 
@@ -29,7 +33,7 @@ class User:
 
     Parameters
     ----------
-    does : {"relaxed", "trace", "push", "turn", "lead", "exaggerate", "cut", "change", "resist", "lost"}
+    does : Does
         A hand that lets go; one that traces the curve by itself; one that pushes; one that turns the stylus; and the
         one that leads a figure. A person also exaggerates here and calms there, cuts a corner, changes over to another
         motion, resists, or gets lost and comes back.
@@ -45,9 +49,7 @@ class User:
         Whose hand it is; without one it is an arm's impedance, with no delay and no noise.
     """
 
-    does: Literal["relaxed", "trace", "push", "turn", "lead", "exaggerate", "cut", "change", "resist", "lost"] = (
-        "relaxed"
-    )
+    does: Does = "relaxed"
     pushes: tuple[Push, ...] = ()
     turns: tuple[Turn, ...] = ()
     grabs: tuple[Grab, ...] = ()
@@ -342,8 +344,3 @@ class RunConfig:
             idle = ("kind", *meaningless_options("robot", leads=False))
             held["figure"] = {name: value for name, value in held["figure"].items() if name not in idle}
         return held
-
-
-def load_config(path: Path) -> RunConfig:
-    """The configuration in a JSON file; see `experiments.config.part.from_file`."""
-    return from_file(RunConfig, path)

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from geometry.whole_files import write_text
 from sim.compilation.unit_cache import cache_folder
-from sim.compilation.whole_files import write_text
 
 _MIN_STORED_DURATION = 2.0  # [s]; shorter durations are not stored
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.arrays import Array, IntArray
+from geometry.whole_files import atomic_file
 from models.errors import ModelError
 from models.humanoid.skeleton import SEGMENTS, figure_model, rest_pose
 from models.mocap.motion.clip import Clip
@@ -85,7 +86,8 @@ def write_gltf(clip: Clip, path: Path) -> None:
     _add_skin(library, document, buffer, model, rest)
     _add_motion(library, document, buffer, clip)
     buffer.close()
-    document.save_binary(str(path))
+    with atomic_file(path) as file:
+        file.writelines(document.save_to_bytes())
 
 
 def _add_skeleton(library: Any, document: Any, model: mujoco.MjModel, clip: Clip) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.arrays import Array
-from sim.compilation.whole_files import read_hashed, write_hashed
+from sim.compilation.hashed_files import read_hashed, write_hashed
 
 
 def cached_array(

@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 
 CURVE_FILE = "curve.json"

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
+from geometry.whole_files import atomic_file
 from models.phantom.parameters import PREMIUM_1_5
-from sim.compilation.whole_files import atomic_file
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, IdentificationResult

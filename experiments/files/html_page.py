@@ -2,12 +2,13 @@
 
 import base64
 import html
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
+
+from experiments.files.figure_files import drawn
 
 NUMBERS = """
 table { font-size: .8rem; }
@@ -58,12 +59,7 @@ def html_page(title: str, body: str, style: str = "") -> str:
 
 def image(picture: Figure | Path, name: str) -> str:
     """HTML of a plot or a PNG file, embedded in the page."""
-    if isinstance(picture, Path):
-        data = picture.read_bytes()
-    else:
-        drawn = io.BytesIO()
-        picture.savefig(drawn, format="png", dpi=110)
-        data = drawn.getvalue()
+    data = picture.read_bytes() if isinstance(picture, Path) else drawn(picture, "png", dpi=110)
     return f'<img alt="{html.escape(name)}" src="data:image/png;base64,{base64.b64encode(data).decode()}">'
 
 

@@ -13,9 +13,9 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from geometry.arrays import Array
+from geometry.whole_files import atomic_file
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
-from sim.compilation.whole_files import atomic_file
 from sim.errors import SimError
 
 VERSION = 1

@@ -26,8 +26,8 @@ from experiments.hardware.run_options import EMULATED, RunHardware
 from experiments.results import folder as results
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.session import Session
+from geometry.whole_files import write_text
 from models.world.scene import SceneConfig
-from sim.compilation.whole_files import write_text
 from sim.devices.hardware_list import check_present
 from sim.errors import SimError
 from sim.hardware.controls import HardwareRun

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from experiments.files.figure_files import save_figure
 from experiments.files.html_page import html_page
 from experiments.paper_figures.bent_and_crossing import crossing_rivers, rendered_result, stretching
 from experiments.paper_figures.curves_and_fields import field_and_map, trajectory_and_vectors, v_plus_u
@@ -18,7 +19,7 @@ from experiments.paper_figures.sources import COMPOSITE, CYLINDER, RIVERS, STRET
 from experiments.results.folder import RECORDING
 from experiments.results.pages.figures import STYLE
 from experiments.runs.run import run
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -124,8 +125,8 @@ def draw_one(drawing: Drawing, runs: Path, out: Path) -> Path:
     with mpl.rc_context(STYLE):
         figure = drawing.draw(runs)
         # Without a creation date, so that the same recordings give the same file.
-        figure.savefig(stem.with_suffix(".pdf"), metadata={"CreationDate": None})
-        figure.savefig(stem.with_suffix(".png"), dpi=DPI)
+        save_figure(figure, stem.with_suffix(".pdf"), metadata={"CreationDate": None})
+        save_figure(figure, stem.with_suffix(".png"), dpi=DPI)
     return stem.with_suffix(".png")
 
 

@@ -7,13 +7,13 @@ from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
 from experiments.preparation.tracking_trial import TRIAL_SECONDS, followed
+from geometry.whole_files import write_text
 from models.mocap.library import check_target, writing
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.hints import Hints
-from sim.compilation.whole_files import write_text
 
 
 def prepare_file(

@@ -12,6 +12,7 @@ from experiments.render.timeline import Timeline, timeline
 from experiments.results.folder import RECORDING
 from geometry.arrays import Array
 from geometry.quaternions import heading
+from geometry.whole_files import atomic_file
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import PlanarDisplacement
 from sim.errors import SimError
@@ -52,7 +53,8 @@ def draw_picture(folder: Path, target: Path, overwrite: bool) -> None:
             picture = np.hstack((picture, figures))
     # Supersampling: each pixel is the mean of several, which smooths edges of shadows and limbs.
     pixels = picture.reshape(HEIGHT, SUPERSAMPLING, WIDTH, SUPERSAMPLING, 3).mean(axis=(1, 3))
-    matplotlib.image.imsave(target, np.rint(pixels).astype(np.uint8))
+    with atomic_file(target) as file:
+        matplotlib.image.imsave(file, np.rint(pixels).astype(np.uint8), format="png")
 
 
 def _draw_device(recording: Recording, world: ShownWorld, moments: Timeline, canvas: Canvas, width: int) -> Image:

@@ -24,6 +24,7 @@ from sim.world.world import BodyKind, World
 
 RECORDING, SUMMARY, REPORT, CONFIG = "run.h5", "summary.json", "report.html", "config.json"
 EDITED, DEFAULT, FIGURES, DEVICE = "edited.bvh", "default.bvh", "figures", "run-device.json"
+FILM, GIF = "film.mp4", "film.gif"
 _RUN_FILES = (RECORDING, SUMMARY, REPORT, CONFIG, EDITED, DEFAULT, CURVE_FILE, DEVICE)
 
 
@@ -81,11 +82,12 @@ def claimed_and_cleared(out: Path, overwrite: bool, device: Phantom | Replay) ->
 
 
 def clear_folder(out: Path) -> None:
-    """Create the folder, and remove the files of an earlier run from it; other files stay."""
+    """Create the folder, and remove the files of an earlier run and its film from it; other files stay."""
     out.mkdir(parents=True, exist_ok=True)
-    if (out / RECORDING).exists():
+    holds_run = (out / RECORDING).exists()
+    if holds_run:
         shutil.rmtree(out / FIGURES, ignore_errors=True)
-    for name in _RUN_FILES:
+    for name in (*_RUN_FILES, FILM, GIF) if holds_run else _RUN_FILES:
         (out / name).unlink(missing_ok=True)
 
 

@@ -26,8 +26,8 @@ from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.setups.parts.part_types import Measuring
 from experiments.setups.session import Session, default_poses
 from experiments.setups.wiring import wire
+from geometry.whole_files import write_text
 from models.mocap.readers.own_bvh import write_bvh_blocks
-from sim.compilation.whole_files import write_text
 from sim.loop.channels import groups, record_into, shown_configuration
 from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
@@ -70,7 +70,7 @@ def run(config: RunConfig, out: Path, overwrite: bool, started: float, view: boo
     for remark in session.remarks:
         console.print(remark, highlight=False)
     full_config = cast(RunConfig, session.config)
-    cost_message = cost_estimate(out, full_config.seconds, groups(session.servo))
+    cost_message = cost_estimate(out, full_config.seconds, groups(session.servo, session.world))
     if cost_message is not None:
         console.print(cost_message, highlight=False)
     with results.claimed_and_cleared(out, overwrite, config.device):
@@ -117,7 +117,8 @@ def record(
         As in `run`.
     """
     servo = session.servo
-    with Recorder(out / results.RECORDING, config, session.config.seed, groups(servo), session.static()) as recorder:
+    kept = groups(servo, session.world)
+    with Recorder(out / results.RECORDING, config, session.config.seed, kept, session.static()) as recorder:
         speed = _simulate(session, recorder, seconds, console, started, view)
         recorder.flush()
         session.haptic_map.check()  # before the measures evaluate it again, outside a tick

@@ -10,7 +10,8 @@ from controllers.errors import ParameterError
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.options import run_config, with_options
 from experiments.config.part import to_dict
-from experiments.config.run_config import RunConfig, load_config
+from experiments.config.paths import load_config
+from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.console.estimates import check_length
 from experiments.files.given_path import given_path
@@ -30,7 +31,8 @@ def run(
     Parameters
     ----------
     config : path, optional
-        A configuration in a JSON file, such as that of a recorded run; the other options change it.
+        A configuration in a JSON file, such as that of a recorded run, from whose folder its relative paths start; the
+        other options change it.
     record : path, optional
         Folder to write recording, configuration, summary, animations, figures and page into; by default a temporary
         one.

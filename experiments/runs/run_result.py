@@ -23,8 +23,8 @@ from experiments.runs.run import record as record_session
 from experiments.runs.run import write_animations, write_summary
 from experiments.setups.session import Session
 from geometry.arrays import Array
+from geometry.whole_files import atomic_file, write_text
 from models.mocap.library import check_target
-from sim.compilation.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 
@@ -147,7 +147,8 @@ class Run:
         if not (self.folder / EDITED).exists():
             write_animations(self.folder, self._session)
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(self.folder / EDITED, target)
+        with (self.folder / EDITED).open("rb") as edited, atomic_file(target) as file:
+            shutil.copyfileobj(edited, file)
         return target
 
     def report(self) -> Path:

@@ -33,7 +33,7 @@ from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
 from sim.devices.device import device_units, first_reading, measure_in_motion
 from sim.devices.simulated import simulated_phantom
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import Servo, run_block, unlinked_field
 from sim.reference.floor_lowering import lower_start, lower_start_unit
 from sim.reference.reference import (

@@ -18,7 +18,7 @@ from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 
 MAX_INITIAL_FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere

@@ -21,6 +21,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River, integrate
 from controllers.state import HandState
+from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.modes.rivers import ADMISSION, HYSTERESIS, SIGMA
 from geometry.arrays import Array
@@ -202,7 +203,7 @@ def main(folder: Path) -> None:
     }
     for name, draw in pictures.items():
         with mpl.rc_context(PLAIN_STYLE):
-            draw().savefig(folder / f"field-{name}.png", dpi=130)
+            save_figure(draw(), folder / f"field-{name}.png", dpi=130)
     print(crossing_table())
 
 

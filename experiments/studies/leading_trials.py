@@ -28,7 +28,7 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.users.hand.arm import Arm
 
 SCALE, STIFFNESS_RATIO, WALKER_RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω [1/s]: the walker's motion is negligible

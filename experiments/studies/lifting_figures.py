@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifting.room import Room
+from experiments.files.figure_files import save_figure
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import LiftedClips, lift_clips
 from experiments.lifting.map_quality import N_SAMPLES, Layout, MapQuality, MotionMeasure, measure_map
@@ -94,7 +95,7 @@ def main(folder: Path) -> None:
     lifted = lift_clips(CLIPS, room)
     hand_made = cylinder(lifted, room)
     with mpl.rc_context({"font.size": 9.0, "axes.titlesize": 9.0, "legend.frameon": False}):
-        curves_figure(lifted, hand_made).savefig(folder / "lifting.png", dpi=130)
+        save_figure(curves_figure(lifted, hand_made), folder / "lifting.png", dpi=130)
     qualities = [measure_map(layout, lifted.clips, np.random.default_rng(1)) for layout in (lifted.layout(), hand_made)]
     print(comparison_table(*qualities))
 

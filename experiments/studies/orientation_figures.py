@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from controllers.state import stylus_path
 from experiments.config.options import run_config
+from experiments.files.figure_files import save_figure
 from experiments.results.folder import RECORDING, clips_of, config_of, world_of
 from experiments.results.pages.figures import AXES, STYLE
 from experiments.runs.run import run
@@ -130,7 +131,7 @@ def main(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as scratch:
         summary = run(CONFIG, Path(scratch) / "run", False, time.perf_counter())
         with Recording(Path(scratch) / "run" / RECORDING) as recording, mpl.rc_context(STYLE):
-            turning_figure(recording).savefig(folder / "orientation.png", dpi=130)
+            save_figure(turning_figure(recording), folder / "orientation.png", dpi=130)
             matplotlib.image.imsave(folder / "orientation-frames.png", frames_picture(recording))
     print(*summary.lines(), sep="\n")
 

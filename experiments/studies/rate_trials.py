@@ -19,6 +19,7 @@ from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
 from controllers.state import VELOCITY
 from experiments.config.options import run_config
+from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import GATE_ADMISSION, HYSTERESIS, SIGMA
 from experiments.setups.parts.governor import speeds_along
@@ -188,7 +189,7 @@ def draw(trial: LedBackflip) -> Figure:
 def main(folder: Path) -> None:
     """Draw the picture of the docs into a folder."""
     with mpl.rc_context(STYLE):
-        draw(LedBackflip()).savefig(folder / "governor.png", dpi=130)
+        save_figure(draw(LedBackflip()), folder / "governor.png", dpi=130)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from experiments.certify.certify import certified_rivers
 from experiments.certify.trial_simulation import FULL_CONDITIONS, Trial, hand_path
 from experiments.config.run_config import RunConfig
 from geometry.arrays import Array
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 HANDS = HandRange((0.25, 0.3), (6.0, 8.0), (0.0, 0.0))
 TICKS = 400  # of a simulation

@@ -17,8 +17,9 @@ from matplotlib.figure import Figure
 
 from controllers.certificates.loop.stability import slowest_mode
 from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
+from experiments.files.figure_files import save_figure
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 _WORLD_INTEGRATOR = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 FINE = Conditions()
@@ -117,7 +118,7 @@ def stability_trials(out: Path = Path("runs/stability_trials"), count: int = 44,
         f"physics steps a period, {_error(again, rows[worst].predicted)} at {FINER.substeps}.\n"
     )
     write_text(out / "trials.md", report)
-    trials_figure(rows).savefig(out / "trials.png", dpi=150)
+    save_figure(trials_figure(rows), out / "trials.png", dpi=150)
     print(report)
 
 

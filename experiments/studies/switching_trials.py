@@ -21,6 +21,7 @@ from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.certified_rivers import certified_bundle, simulated_course
+from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import STYLE
 from experiments.setups.modes.rivers import ADMISSION, SIGMA
 from experiments.studies.field_figures import SPEED, straight_river
@@ -129,7 +130,7 @@ def main(arguments: list[str]) -> None:
     """Count the outcomes of a given number of trials, or draw them into a given folder."""
     if not arguments[0].isdecimal():
         with mpl.rc_context(STYLE):
-            outcomes_figure(40).savefig(Path(arguments[0]) / "switching-trials.png", dpi=130)
+            save_figure(outcomes_figure(40), Path(arguments[0]) / "switching-trials.png", dpi=130)
         return
     for (certified, kept), times in sorted(trials(int(arguments[0])).items()):
         print(f"certified {certified}, kept {kept}: {times}")

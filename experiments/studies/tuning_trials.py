@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.trials.analysis.mixed_model import CONFIDENCE_LEVEL
 from experiments.tuning.tune_config import TuneConfig, read_tuning
-from experiments.tuning.tuning import Tuned, run_tuning
+from experiments.tuning.tuning import Comparison, Tuned, run_tuning
 from geometry.arrays import Array
 
 
@@ -39,23 +39,29 @@ def lines(found: Sequence[Tuned]) -> list[str]:
     for first in found[0].comparisons:
         name = (first.contender, first.objective)
         of = [c for one in found for c in one.comparisons if (c.contender, c.objective) == name]
+        own = ", ".join(map(_gain, of))
+        if len(of) == 1:
+            lines.append(f"{name[1]} against {name[0]}, one replication: better by {own}")
+            continue
         gains = np.array([c.better_by for c in of])
         low, high = t_interval(gains)
         lines.append(
             f"{name[1]} against {name[0]}: better by {np.mean(gains):.3g} (95 % interval {low:.3g} to {high:.3g} over "
             f"{len(of)} replications), in {np.sum(gains > 0.0)} of them, by its own interval in "
-            f"{sum(c.low > 0.0 for c in of)}: "
-            + ", ".join(f"{c.better_by:.3g} ({c.low:.3g} to {c.high:.3g})" for c in of)
+            f"{sum(c.low > 0.0 for c in of)}: {own}"
         )
     return lines
 
 
+def _gain(one: Comparison) -> str:
+    """Gain of one replication in words, with its interval where its users were enough for one."""
+    return f"{one.better_by:.3g}" + (f" ({one.low:.3g} to {one.high:.3g})" if np.isfinite(one.low) else "")
+
+
 def t_interval(values: Array) -> tuple[float, float]:
-    """Student's interval of a mean, as a bootstrap's is too narrow for a few replications; NaN for fewer than two."""
+    """Student's interval of the mean of two or more values, as a bootstrap's is too narrow for a few replications."""
     from scipy.stats import t
 
-    if len(values) < 2:
-        return float("nan"), float("nan")
     half = (
         float(t.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, len(values) - 1)) * float(np.std(values, ddof=1)) / len(values) ** 0.5
     )

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.config.options import run_config
+from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.wiring import wire
 from geometry.arrays import Array
@@ -78,4 +79,4 @@ def wall_figure(without: WallRun, with_walls: WallRun) -> Figure:
 if __name__ == "__main__":
     with mpl.rc_context(PLAIN_STYLE):
         drawing = wall_figure(pushed_run(walls=False), pushed_run(walls=True))
-        drawing.savefig(Path(sys.argv[1]) / "soft-walls.png", dpi=150)
+        save_figure(drawing, Path(sys.argv[1]) / "soft-walls.png", dpi=150)

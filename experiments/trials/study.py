@@ -13,6 +13,7 @@ from controllers.checks import check_field_types, check_kind
 from experiments.certify.cached_stability import cached_stability
 from experiments.config.keywords import with_keyword_messages
 from experiments.config.part import to_json
+from experiments.config.paths import relative_to
 from experiments.files.given_path import given_path
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import Statistics
@@ -24,7 +25,7 @@ from experiments.trials.execution.drive import check_writable, compile_and_make_
 from experiments.trials.execution.executors import executor
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
 from experiments.trials.trial.run_trial import Row
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 DATABASE, SUMMARY, REPORT = "study.sqlite", "summary.json", "report.html"
 
@@ -91,7 +92,7 @@ class Study:
             If it cannot be read, or contains an unknown entry.
         """
         file = given_path("path", path)
-        config = parse_study(read_toml(file, "a study"), str(file))
+        config = parse_study(read_toml(file, "a study"), str(file)).with_paths(relative_to(file.parent))
         return Study(config, file.read_text(encoding="utf-8-sig"))
 
     @staticmethod

@@ -22,6 +22,7 @@ from experiments.runs.simulation import Simulation, User
 from experiments.runs.sweep import with_values
 from experiments.trials.design.plan import code_hash
 from experiments.trials.design.study_config import MAX_TRIALS, check_trials
+from experiments.tuning.tune_config import Sampler
 from geometry.arrays import Array
 
 Cost = Callable[[Run], float | Sequence[float]]
@@ -55,7 +56,7 @@ class Search:
     """
 
     candidates: int = 30
-    sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
+    sampler: Sampler = "tpe"
     costs: int = 1
     threads: int = 1
     allow_unknown: bool = False

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -11,6 +12,7 @@ from controllers.errors import ParameterError
 from experiments.config.keywords import to_keywords
 from experiments.config.options import run_config
 from experiments.config.part import above, at_least, from_dict, part, whole_number
+from experiments.config.paths import relative_to, with_paths_of_options
 from experiments.config.run_config import RunConfig
 from experiments.trials.design.study_config import MAX_TRIAL_DURATION, StudyError, Users, Words, check_trials, read_toml
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, measures_of
@@ -18,6 +20,9 @@ from sim.users.person.population import population
 
 MARGIN = "margin"
 """Objective that is not a measure of trials: the certificate's margin (critical k_r)/k_r − 1, to be maximised."""
+
+Sampler = Literal["tpe", "cma-es", "nsga-ii", "random"]
+"""Search methods of Optuna; `experiments.tuning.search.sampler_of` makes them."""
 
 
 @part
@@ -65,7 +70,7 @@ class TuneConfig:
         Simulated time of a trial [s].
     candidates : int
         Number of candidates to simulate.
-    sampler : {"tpe", "cma-es", "nsga-ii", "random"}
+    sampler : Sampler
         Sampler that proposes them.
     prune : bool
         Give up a candidate that is worse than the median after part of the panel; with one objective only.
@@ -90,7 +95,7 @@ class TuneConfig:
     repetitions: int = whole_number(1, default=1)
     seconds: float = above(0.0, default=6.0, unit="s", most=MAX_TRIAL_DURATION)
     candidates: int = whole_number(1, default=40)
-    sampler: Literal["tpe", "cma-es", "nsga-ii", "random"] = "tpe"
+    sampler: Sampler = "tpe"
     prune: bool = True
     least_margin: float = at_least(0.0, default=0.0)
     allow_unknown: bool = False
@@ -151,6 +156,7 @@ def read_tuning(path: Path) -> TuneConfig:
         If it cannot be read, or contradicts itself.
     """
     config = from_dict(TuneConfig, cast(Mapping[str, Any], read_toml(path, "a tuning")), str(path))
+    config = replace(config, run=with_paths_of_options(config.run, relative_to(path.parent)))
     check_tuning(config)
     return config
 

@@ -1,6 +1,7 @@
 """Runs a tuning: search, comparison with baselines, certificate and report."""
 
 import hashlib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from experiments.certify.certify import certify_into
 from experiments.config.part import to_json
+from experiments.config.paths import with_paths
 from experiments.files.json_text import json_text
 from experiments.trials.analysis.statistics import bootstrap_interval
 from experiments.trials.design.study_config import StudyError, Where
@@ -24,7 +26,7 @@ from experiments.tuning.page import gains_figure, objectives_figure, tuning_page
 from experiments.tuning.panel import Panel, panel_runs
 from experiments.tuning.search import Candidate, best_candidate, distributions_of, search, signs_of, storage_of
 from experiments.tuning.tune_config import MARGIN, TuneConfig, label_of
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 
 DATABASE, JOURNAL, CHOSEN, REPORT, SUMMARY = "tune.sqlite", "tune.journal", "chosen.json", "report.html", "summary.json"
 CERTIFICATE = "certificate"
@@ -145,7 +147,7 @@ def _write_results(
     config: TuneConfig, out: Path, text: str, found: Sequence[Candidate], best: Candidate, judged: Sequence[Contender]
 ) -> Tuned:
     tuned = judged[0]
-    write_text(out / CHOSEN, to_json(tuned.config))
+    write_text(out / CHOSEN, to_json(with_paths(tuned.config, os.path.abspath)))
     certificate = certify_into(tuned.config, out / CERTIFICATE)
     comparisons = compared(config, judged)
     importances = importances_of(config, found)

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import llvmlite.binding
 
+from geometry.whole_files import atomic_file
 from sim.compilation.unit_cache import cache_folder
-from sim.compilation.whole_files import atomic_file
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("geometry", "models", "controllers", "sim", "experiments")

@@ -23,8 +23,8 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from sim.compilation.deferred_codegen import is_nested, referred_by_name
+from sim.compilation.hashed_files import read_hashed, write_hashed
 from sim.compilation.unit_key import unit_key
-from sim.compilation.whole_files import read_hashed, write_hashed
 
 _SUFFIX = ".unit"
 _MAX_UNUSED_TIME = 60 * 86400.0  # [s] after which an unused unit is removed

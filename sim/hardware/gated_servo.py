@@ -15,8 +15,7 @@ from sim.devices.driver import JITTER, LOST, REFUSED, ROUND_TRIP, STALENESS, TEM
 from sim.devices.exchange import READING_CLOCK, READING_GIMBAL, READING_SEQUENCE, READING_THETA, Exchange
 from sim.errors import SimError
 from sim.hardware.gated_tick import MOTOR_HEAT, MOTORS_ON, GateMemory, gated_tick
-from sim.loop.channels import tick_channels
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs, tick_channels
 from sim.loop.servo import Servo, rearm_servo, run_block
 from sim.world.world import World
 

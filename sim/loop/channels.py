@@ -1,11 +1,11 @@
-"""Recorded channels of a run, depending on the body that follows the hand, and the observer that records them."""
+"""Logs of a block of ticks, and the channels recorded from them, which depend on the body that follows the hand."""
 
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
 
-from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER
+from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_RIVER, TRACE_SIZE
 from controllers.state import (
     HAND_ANGULAR_VELOCITY,
     HAND_QUATERNION,
@@ -26,7 +26,7 @@ from sim.recording.recorder import Group, Recorder
 from sim.world.world import World
 
 Channels = Callable[[TickLog, FrameLog, int], dict[str, dict[str, Array]]]
-"""Gives the channels of a block of n ticks, by group and name."""
+"""Gives the channels of a block of n ticks, by group and name; a channel that is added here is recorded."""
 
 
 def configuration_size(servo: Servo) -> int:
@@ -42,59 +42,62 @@ def shown_configuration(servo: Servo) -> Array:
     return servo.plant.qpos
 
 
-def groups(servo: Servo) -> dict[str, Group]:
-    """The channels that a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the body's.
+def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
+    """Empty logs for a block of ticks."""
+    plant = servo.plant
+    frames = -(-ticks // servo.figure_ticks)
+    return (
+        TickLog(
+            hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
+            user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
+            trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
+            applied=np.zeros((ticks, plant.substeps, servo.device.user_torques)),
+            residual=np.zeros((ticks, len(servo.figure.applied))), fault=np.zeros((ticks, 3)),
+        ),
+        FrameLog(
+            t=np.zeros(frames), qpos=np.zeros((frames, configuration_size(servo))),
+            reference=np.zeros((frames, len(servo.reference.pose))),
+            report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
+        ),
+    )  # fmt: skip
+
+
+def groups(servo: Servo, world: World) -> dict[str, Group]:
+    """The channels that a run records, for `Recorder`: ``ticks`` at the servo's rate, ``frames`` at the body's."""
+    n, rate = servo.figure_ticks, 1.0 / servo.plant.period
+    blocks = channels(servo, world)(*make_logs(servo, n), n)  # whose rows have the shapes of those to be recorded
+    rates = {"ticks": rate, "frames": rate / servo.figure_ticks}
+    return {
+        group: Group(rates[group], {name: block.shape[1:] for name, block in arrays.items()})
+        for group, arrays in blocks.items()
+    }
+
+
+def channels(servo: Servo, world: World) -> Channels:
+    """A function that gives the channels of a block.
 
     ``frames`` holds tracking errors, residual and ground force only for a figure in the physics, the reference only if
     there is a body, and joint angles [rad] and tool positions [m] only for a robot arm, which has no residual.
     """
-    plant, body = servo.plant, servo.figure
-    ticks: dict[str, tuple[int, ...]] = {
-        "t": (), "p": (3,), "quaternion": (4,), "v": (3,), "omega": (3,), "switch": (), "field": (6,),
-        "force": (3,), "user": (3,), "tank": (), "tank_scale": (), "torque": (3,),
-        "phase": (), "nearest": (3,), "distance": (), "river": (),
-        "ctrl": (len(plant.ctrl),), "applied": (plant.substeps, servo.device.user_torques), "residual": (6,),
-        "fault": (), "fault_value": (), "gaps": (),
-    }  # fmt: skip
-    frames: dict[str, tuple[int, ...]] = {"t": (), "qpos": (configuration_size(servo),)}
-    if not isinstance(body, NoFigure):
-        frames |= {"reference": servo.reference.pose.shape}
-    if isinstance(body, FigureState):
-        frames |= {
-            "joint_error": (), "root_error": (), "residual": (6,), "ground": (3,), "flight": (), "down": (),
-            "saturated": (),
-        }  # fmt: skip
-    if isinstance(body, RobotState):
-        del ticks["residual"]
-        frames |= {"joints": body.qpos.shape, "tool": (3,), "led": (3,), "saturated": ()}
-    return {
-        "ticks": Group(1.0 / plant.period, ticks), "frames": Group(1.0 / (plant.period * servo.figure_ticks), frames)
-    }  # fmt: skip
-
-
-def channels(servo: Servo, world: World) -> Channels:
-    """A function that gives the channels of `groups` of a block."""
-    body, root, names = servo.figure, world.pose_at, groups(servo)
+    body, root = servo.figure, world.pose_at
     arm = mujoco.MjData(world.body) if isinstance(body, RobotState) else None
 
     def block_channels(ticks: TickLog, frames: FrameLog, n: int) -> dict[str, dict[str, Array]]:
-        m = -(-n // servo.figure_ticks)
-        tick_arrays = tick_channels(ticks, n)
+        m, tick_arrays = -(-n // servo.figure_ticks), tick_channels(ticks, n)
         if isinstance(body, FigureState):
-            frame_arrays = frame_channels(frames, m, root)
-        else:
-            frame_arrays = {"t": frames.t[:m], "qpos": frames.qpos[:m], "reference": frames.reference[:m]}
+            return {"ticks": tick_arrays, "frames": frame_channels(frames, m, root)}
+        frame_arrays = {"t": frames.t[:m], "qpos": frames.qpos[:m]}
+        if not isinstance(body, NoFigure):
+            frame_arrays["reference"] = frames.reference[:m]
         if arm is not None:
+            del tick_arrays["residual"]
             joints = frames.qpos[:m, root : root + len(world.body.qpos0)]
             frame_arrays |= {
                 "joints": joints, "tool": tool_positions(world.body, arm, joints),
                 "led": tool_positions(world.body, arm, frames.reference[:m]),
                 "saturated": frames.report[:m, REPORT_SATURATED],
             }  # fmt: skip
-        return {
-            "ticks": {name: tick_arrays[name] for name in names["ticks"].channels},
-            "frames": {name: frame_arrays[name] for name in names["frames"].channels},
-        }
+        return {"ticks": tick_arrays, "frames": frame_arrays}
 
     return block_channels
 

@@ -7,15 +7,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.state import HandState
 from geometry.arrays import Array
 from sim.compilation.lost_interrupts import reraise_lost_interrupts
 from sim.devices.device import available_ticks, read_device
 from sim.errors import SimError
-from sim.loop.channels import configuration_size
+from sim.loop.channels import make_logs
 from sim.loop.servo import FrameLog, Servo, TickLog, run_block
 from sim.world.world import World
 
@@ -48,26 +45,6 @@ def peak_memory_mb() -> float:
         return int(line.split()[1]) / 1e3
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / 1e6 if sys.platform == "darwin" else peak / 1e3
-
-
-def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
-    """Empty logs for a block of ticks."""
-    plant = servo.plant
-    frames = -(-ticks // servo.figure_ticks)
-    return (
-        TickLog(
-            hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
-            user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
-            trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
-            applied=np.zeros((ticks, plant.substeps, servo.device.user_torques)),
-            residual=np.zeros((ticks, len(servo.figure.applied))), fault=np.zeros((ticks, 3)),
-        ),
-        FrameLog(
-            t=np.zeros(frames), qpos=np.zeros((frames, configuration_size(servo))),
-            reference=np.zeros((frames, len(servo.reference.pose))),
-            report=np.zeros((frames, len(servo.figure.report))), ground=np.zeros((frames, 3)),
-        ),
-    )  # fmt: skip
 
 
 Observer = Callable[[TickLog, FrameLog, int], None]

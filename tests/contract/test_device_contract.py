@@ -152,7 +152,7 @@ def test_repeated_runs_are_identical(make_subject) -> None:
 
 def test_recording_replays_to_the_same_positions(make_subject, tmp_path: Path) -> None:
     subject = make_subject()
-    with Recorder(tmp_path / "run.h5", {}, 1, groups(subject.servo), {}) as recorder:
+    with Recorder(tmp_path / "run.h5", {}, 1, groups(subject.servo, subject.world), {}) as recorder:
         loop = Loop(
             subject.servo,
             subject.world,

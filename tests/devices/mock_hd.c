@@ -40,6 +40,11 @@ void mock_missing(int missing) { m.missing = missing; }
 void mock_no_scheduler(int none) { m.no_scheduler = none; }
 void mock_temperature(double share) { m.temperature = share; }
 unsigned long mock_frames(void) { return m.frames; }
+int mock_wait(unsigned long frames) { /* until the scheduler has served so many; 0 after a minute */
+    struct timespec a_millisecond = {0, 1000000};
+    for (int k = 0; k < 60000 && m.frames < frames; k++) nanosleep(&a_millisecond, 0);
+    return m.frames >= frames;
+}
 int mock_is_counted(void) { return heap_open != 0; }
 unsigned long mock_served(void) { return m.served; }
 int mock_opened(void) { return m.opened; }

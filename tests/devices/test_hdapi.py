@@ -179,13 +179,11 @@ def test_vendor_thread_serves_at_1_khz(hd) -> None:
 
 def test_vendor_thread_runs_without_the_gil_and_stops_force_without_commands(hd) -> None:
     hd.mock_manual(0)
-    device, libc = HdapiDevice(hd), ctypes.PyDLL(None)  # which keeps the GIL
+    device, keeps_gil = HdapiDevice(hd), ctypes.PyDLL(hd._name)
     while not device.read(np.zeros(9), 0.5):
         pass
     device.write(np.ones(3), True)
-    frames = hd.mock_frames()
-    libc.usleep(200_000)
-    assert hd.mock_frames() - frames > 50
+    assert keeps_gil.mock_wait(hd.mock_frames() + 100)
     assert not motor_force(hd).any()
     device.close()
 

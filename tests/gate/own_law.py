@@ -27,7 +27,7 @@ def main(out: Path) -> None:
     config = run_config(clips=("cheer", "angry"), seconds=1.0)
     session, loop = loop_with(config, field, lambda ticks, frames, n: record(ticks, frames, n))
     out.mkdir(parents=True)
-    with Recorder(out / "run.h5", {}, 1, groups(session.servo), {}) as recorder:
+    with Recorder(out / "run.h5", {}, 1, groups(session.servo, session.world), {}) as recorder:
         record = record_into(recorder, session.servo, session.world)
         loop.run(config.seconds)
 

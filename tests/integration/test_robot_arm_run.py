@@ -12,7 +12,7 @@ import pytest
 import hvf
 from experiments.cli import main
 from experiments.config.options import run_config
-from experiments.config.run_config import load_config
+from experiments.config.paths import load_config
 from experiments.results.pages.report import write_report_of
 from experiments.setups.maps.robot_arm import HOME
 from experiments.setups.parts.defaults import resolved

@@ -25,7 +25,7 @@ from sim.devices.exchange import (
     valid_torque,
 )
 from sim.devices.simulated import SimulatedPhantom, simulated_phantom
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import FrameLog, Servo, TickLog, run_block, unlinked_field
 from sim.reference.reference import no_reference
 from sim.users.hand.arm import Arm

@@ -16,6 +16,7 @@ from experiments.live.session.gain_verdict import GainVerdict
 from experiments.live.session.gains import with_gain
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from geometry.arrays import Array
+from geometry.whole_files import atomic_file
 from sim.errors import SimError
 
 HISTORY_DURATION = 60.0  # [s] of history that can be viewed again
@@ -310,7 +311,8 @@ class Desk:
             raise SimError(f"{self.preparing[0]} is being prepared; expected one file at a time")
         uploads = self.folder / "uploads"
         uploads.mkdir(parents=True, exist_ok=True)
-        (uploads / file).write_bytes(content)
+        with atomic_file(uploads / file) as upload:
+            upload.write(content)
         if file.lower().endswith(".asf"):
             self._say(f"{file}: the skeleton is kept; its AMC can come now.")
             return

@@ -17,7 +17,7 @@ from experiments.setups.setups import parts_of
 from geometry.arrays import Array
 from sim.compilation.compiled import entry_point
 from sim.devices.simulated import SimulatedPhantom
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import Field, FrameLog, TickLog, rearm_servo, run_block
 from sim.loop.snapshots import Snapshot, restore_snapshot, take_snapshot
 from sim.users.hand.dragged import dragged, relaxed, tremor

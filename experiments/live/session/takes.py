@@ -16,7 +16,7 @@ from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
 from experiments.runs.run import write_animations
 from experiments.setups.session import default_poses
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 from sim.loop.channels import groups, record_into
 from sim.loop.loop import peak_memory_mb
@@ -56,7 +56,7 @@ class Take:
         servo = engine.session.servo
         static = engine.session.static() | {"live": LIVE}
         config = to_dict(engine.config)
-        self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo), static)
+        self._recorder = Recorder(folder / RECORDING, config, engine.config.seed, groups(servo, engine.world), static)
         self._record_logs = record_into(self._recorder, servo, engine.world)
         self._handled_spans: list[tuple[float, float]] = []
         self._tick_count = 0

@@ -19,6 +19,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from experiments.files.figure_files import save_figure
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from geometry.arrays import Array, Mask
@@ -56,7 +57,7 @@ def save_figures(
         with mpl.rc_context(STYLE):
             drawing = draw(recording)
             folder.mkdir(parents=True, exist_ok=True)  # only now: a recording without rows leaves no folder
-            drawing.savefig(file, dpi=150)
+            save_figure(drawing, file, dpi=150)
     return files
 
 

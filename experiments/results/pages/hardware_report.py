@@ -13,7 +13,7 @@ from controllers.safety.faults import Fault
 from experiments.files.html_page import html_page, image
 from experiments.results.folder import FIGURES, REPORT
 from experiments.results.pages.figures import AXES, save_figures, shade, thinned_rows
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, USER
 

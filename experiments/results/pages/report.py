@@ -17,7 +17,7 @@ from experiments.results.pages.figures import draw_figures, save_figures
 from experiments.results.pages.hardware_report import write_hardware_report
 from experiments.results.pages.mode_figures import arm_figure, lead_figure, stretch_figure
 from experiments.results.pages.plots import plots_html
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.errors import SimError
 from sim.recording.recording import Recording
 from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER

@@ -1,10 +1,12 @@
 """What a configuration leaves open: gains and flow of a mode, which depend on the kind of map, and the lap."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 
 from experiments.config.maps import Composite, MapFile
 from experiments.config.modes import Follow, Rivers, Stretch, StretchThenFollow, StretchyTube
+from experiments.config.paths import with_paths
 from experiments.config.run_config import RunConfig
 from experiments.setups.parts.lap import with_lap
 
@@ -39,13 +41,14 @@ _DEFAULTS_BY_MAP: Mapping[type, _ModeDefaults] = {
 
 
 def resolved(config: RunConfig) -> RunConfig:
-    """A configuration with the gains, the flow and the lap that it leaves open filled in.
+    """A configuration with full paths, and with the gains, the flow and the lap that it leaves open filled in.
 
     Raises
     ------
     HvfError
         As `with_lap`.
     """
+    config = with_paths(config, os.path.abspath)
     values = _DEFAULTS_BY_MAP.get(type(config.map), _CIRCLE_DEFAULTS).get(type(config.mode), {})
     missing = {name: value for name, value in values.items() if getattr(config.mode, name) is None}
     return replace(config, map=with_lap(config.map), mode=replace(config.mode, **missing))

@@ -1,16 +1,17 @@
 """The simulated hand of a run: where the stylus begins, and which pushes, grabs and turns the user makes."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from experiments.config.run_config import User
+from experiments.config.run_config import PERSON_INTENTS, User
 from experiments.setups.parts.expression import lap_turns
 from geometry.arrays import Array
 from sim.users.hand.actions import Grab, Push
 from sim.users.hand.arm import Arm
-from sim.users.intents import Bend, ChangeOver, CutCorner, Exaggerate, GetLost, Own, Press, Relax, Resist, Trace
+from sim.users.intents import Bend, ChangeOver, Own, Press, Relax, Trace
 from sim.users.intents.intent import PersonIntent
 from sim.users.participant import Participant
 from sim.users.person.person import Person
@@ -153,10 +154,7 @@ def intent_of(user: User) -> PersonIntent:
     return Press(user.pushes) if user.pushes else _INTENTS[user.does]
 
 
-_INTENTS: dict[str, PersonIntent] = {
-    "relaxed": Relax(), "push": Relax(), "trace": Trace(), "exaggerate": Exaggerate(), "cut": CutCorner(),
-    "change": ChangeOver(), "resist": Resist(), "lost": GetLost(),
-}  # fmt: skip
+_INTENTS: Mapping[str, PersonIntent] = {"relaxed": Relax(), "push": Relax(), "trace": Trace(), **PERSON_INTENTS}
 
 
 def first_pushed_lap(curve: Trajectory, grabs: tuple[Grab, ...]) -> float:

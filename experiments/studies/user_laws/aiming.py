@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.studies.user_laws.bare_device import SETTLING_TIME, Trace, trial
+from experiments.studies.user_laws.bare_device import SETTLING_TIME, End, Trace, trial
 from experiments.studies.user_laws.law import Law, Study
 from geometry.arrays import Array
 from sim.users.person.person import Person
@@ -90,5 +90,5 @@ def _first_ends(trace: Trace) -> Array:
 def _tap(person: Person, amplitude: float, width: float, seed: int) -> Trace:
     points = np.zeros((N_MOVEMENTS + 1, 3))
     points[:, 1] = 0.5 * amplitude * np.where(np.arange(N_MOVEMENTS + 1) % 2 == 0, -1.0, 1.0)
-    trace = trial(person, targets(points, width), _TRIAL_DURATION, seed, points[0], clicks=N_MOVEMENTS + 1)
+    trace = trial(person, targets(points, width), _TRIAL_DURATION, seed, points[0], end=End(clicks=N_MOVEMENTS + 1))
     return trace._replace(clicks=trace.clicks[: N_MOVEMENTS + 1])

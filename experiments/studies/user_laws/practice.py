@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import curve_fit
 
-from experiments.studies.user_laws.bare_device import PERIOD, trial
+from experiments.studies.user_laws.bare_device import PERIOD, End, trial
 from experiments.studies.user_laws.law import Law, Study
 from geometry.arrays import Array
 from sim.users.person.person import Person
@@ -71,9 +71,9 @@ def endurance(people: Sequence[Person], seed: int) -> Study:
         seconds = 1.3 * 60.0 / FATIGUE * (1.0 - load) / load
         pushes = np.zeros((round(seconds / PERIOD), 3))
         pushes[:, 0] = load * STRENGTH * np.minimum(1.0, PERIOD * np.arange(len(pushes)))
-        trace = trial(weak, Wishes(following(np.zeros((2, 3)))), seconds, seed, np.zeros(3), pushes)
-        slipped = (np.linalg.norm(trace.p, axis=1) > SLIP_DISTANCE) & (trace.t > LOADING_TIME)
-        times.append(float(trace.t[np.argmax(slipped)]) if np.any(slipped) else np.nan)
+        end = End(slip=SLIP_DISTANCE, slips_from=LOADING_TIME)
+        trace = trial(weak, Wishes(following(np.zeros((2, 3)))), seconds, seed, np.zeros(3), pushes, end)
+        times.append(float(trace.t[-1]) if len(trace.t) < len(pushes) else np.nan)
     x, y = np.array(LOADS), np.array(times)
     slope, intercept = np.polyfit(np.log(x), np.log(y), 1)
     half = float(np.exp(intercept + slope * np.log(0.5)))

@@ -8,13 +8,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from controllers.errors import ParameterError
+from experiments.files.figure_files import save_figure
 from experiments.files.json_text import json_text
 from experiments.studies.user_laws.aiming import fitts, scatter
 from experiments.studies.user_laws.holding import grip, step_response, tremor
 from experiments.studies.user_laws.law import Law, Study
 from experiments.studies.user_laws.practice import endurance, practice
 from experiments.studies.user_laws.tracing import power_law, steering
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.users.person.person import Person
 from sim.users.person.population import population
 
@@ -110,7 +111,7 @@ def draw(study: Study, path: Path) -> None:
     axes.set_xlabel(study.labels[0])
     axes.set_ylabel(study.labels[1])
     axes.grid(alpha=0.3, which="both")
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=110)
     plt.close(figure)
 
 

@@ -20,7 +20,7 @@ from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, TrialLog
 from experiments.trials.trial.run_trial import MapCache, run_recorded
-from sim.compilation.whole_files import write_text
+from geometry.whole_files import write_text
 from sim.recording.recording import Recording
 from sim.viewer.replay_html import replay_html
 
@@ -207,7 +207,7 @@ def write_report(
     write_text(path, _page(study, text, said, found, plots, counts, shown, provenance))
     rows = [asdict(contrast) for contrast in found.contrasts]
     columns = [field.name for field in fields(Contrast)]
-    pd.DataFrame.from_records(rows, columns=columns).to_csv(path.with_name(_CONTRASTS_FILE), index=False)
+    write_text(path.with_name(_CONTRASTS_FILE), pd.DataFrame.from_records(rows, columns=columns).to_csv(index=False))
     return found, said
 
 
@@ -216,7 +216,7 @@ def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence
     done = frame[frame["state"].eq("done") & frame[measure].notna()]
     panels: list[tuple[str, Any]] = [("", done)]
     if rest:
-        panels = [(", ".join(map(str, name)), part) for name, part in done.groupby(list(rest), sort=False)]
+        panels = [(_plain(", ".join(map(str, name))), part) for name, part in done.groupby(list(rest), sort=False)]
     figure = Figure(figsize=(3.2 * len(panels) + 0.8, 3.4), layout="constrained")
     axes: Any = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axis, (title, part) in zip(axes, panels, strict=True):
@@ -224,12 +224,17 @@ def levels_figure(frame: Any, factor: str, levels: Sequence[str], rest: Sequence
         for values in means.to_numpy():
             axis.plot(range(len(levels)), values, color=_USER_COLOUR, lw=0.8, marker="o", ms=3, alpha=0.7)
         axis.plot(range(len(levels)), means.mean(), color=_MEAN_COLOUR, lw=0, marker="_", ms=28, mew=3)
-        axis.set_xticks(range(len(levels)), list(levels))
+        axis.set_xticks(range(len(levels)), list(map(_plain, levels)))
         axis.set_title(title, fontsize=10)
         axis.set_xlim(-0.5, len(levels) - 0.5)
         axis.grid(axis="y", alpha=0.3)
     axes[0].set_ylabel(MEASURES[measure].label)
     return figure
+
+
+def _plain(name: str) -> str:
+    """A name in a plot, in which a dollar sign begins no formula."""
+    return name.replace("$", r"\$")
 
 
 def effects_figure(found: Statistics, factor: str) -> Figure | None:
@@ -245,13 +250,14 @@ def effects_figure(found: Statistics, factor: str) -> Figure | None:
     for k, level in enumerate(levels):
         values = [rows[m, level].effect if (m, level) in rows else np.nan for m in measures]
         places = np.arange(len(measures)) + 0.8 * ((k + 0.5) / len(levels) - 0.5)
-        axis.barh(places, values, height=0.7 / len(levels), label=level)
+        axis.barh(places, values, height=0.7 / len(levels), label=_plain(level))
     axis.set_yticks(range(len(measures)), [MEASURES[m].name.replace("_", " ") for m in measures])
     axis.invert_yaxis()
     axis.axvline(0.0, color="#333", lw=0.8)
     axis.set_xscale("symlog", linthresh=1.0)
     axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_xlabel(f"d_z or g, from {contrasts[0].reference!r}\n(linear within ±1; large where users are alike)")
+    reference = _plain(repr(contrasts[0].reference))
+    axis.set_xlabel(f"d_z or g, from {reference}\n(linear within ±1; large where users are alike)")
     figure.legend(loc="outside upper center", ncols=min(4, len(levels)), frameon=False, fontsize=9)
     axis.grid(axis="x", alpha=0.3)
     return figure

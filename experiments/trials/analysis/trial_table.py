@@ -8,6 +8,7 @@ from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyError
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
 from experiments.trials.trial.run_trial import Row
+from geometry.whole_files import atomic_file, write_text
 
 TABLE_CSV, TABLE_PARQUET = "trials.csv", "trials.parquet"
 _INSTALL_HINT = "studies are analysed with pandas, pyarrow and statsmodels: pip install 'haptic-vector-fields[study]'"
@@ -59,10 +60,11 @@ def trial_table(
 def write_table(frame: Any, folder: Path) -> None:
     """Write the table as Parquet and as CSV."""
     try:
-        frame.to_parquet(folder / TABLE_PARQUET, index=False)
+        with atomic_file(folder / TABLE_PARQUET) as file:
+            frame.to_parquet(file, index=False)
     except ImportError:
         raise StudyError(_INSTALL_HINT) from None
-    frame.to_csv(folder / TABLE_CSV, index=False)
+    write_text(folder / TABLE_CSV, frame.to_csv(index=False))
 
 
 def measured_columns(frame: Any) -> list[str]:

@@ -1,6 +1,7 @@
 """The plan of a study: a configuration and a key for every trial."""
 
 import hashlib
+import os
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,6 +17,7 @@ from experiments.config.keywords import to_keywords
 from experiments.config.maps import MapFile
 from experiments.config.options import run_config
 from experiments.config.part import to_json
+from experiments.config.paths import with_paths
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.lap import with_lap
@@ -81,8 +83,9 @@ def trial_key(config: RunConfig) -> str:
     StudyError
         If a file that it names does not exist.
     """
-    files = [f"{name} {file_digest(name)}" for name in files_of(config)]  # first: refuses files that do not exist
-    return hashlib.sha256("\n".join([code_hash(), to_json(resolved(config)), *files]).encode()).hexdigest()[:32]
+    files = [f"{os.path.basename(name)} {file_digest(name)}" for name in files_of(config)]  # refuses missing ones first
+    settings = to_json(with_paths(resolved(config), os.path.basename))  # the same wherever the files are
+    return hashlib.sha256("\n".join([code_hash(), settings, *files]).encode()).hexdigest()[:32]
 
 
 @cache

@@ -1,7 +1,7 @@
 """Configuration of a study, read from a TOML file or given in Python."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
@@ -10,6 +10,7 @@ from pydantic import Field
 
 from controllers.errors import ParameterError
 from experiments.config.part import above, from_dict, part, whole_number
+from experiments.config.paths import with_paths_of_options
 from sim.errors import SimError
 
 
@@ -97,6 +98,14 @@ class StudyConfig:
         """The same study with another number of users, or another seed of trials and population."""
         users = self.users if number is None else replace(self.users, number=number)
         return replace(self, users=users) if seed is None else replace(self, users=replace(users, seed=seed), seed=seed)
+
+    def with_paths(self, change: Callable[[str], str]) -> "StudyConfig":
+        """The same study in whose options a function has changed the paths."""
+        factors = {
+            name: {level: with_paths_of_options(words, change) for level, words in levels.items()}
+            for name, levels in self.factors.items()
+        }
+        return replace(self, run=with_paths_of_options(self.run, change), factors=factors)
 
 
 def parse_study(values: Mapping[str, object], where: str) -> StudyConfig:

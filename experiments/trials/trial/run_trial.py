@@ -144,7 +144,7 @@ def run_recorded(config: RunConfig, session: Session, log: TrialLog, folder: Pat
     """Run a trial, record it into an existing folder, and measure it."""
     servo, laws = session.servo, session.parts.program.python_laws
     static = session.static()
-    with Recorder(folder / RECORDING, to_dict(config), config.seed, groups(servo), static) as recorder:
+    with Recorder(folder / RECORDING, to_dict(config), config.seed, groups(servo, session.world), static) as recorder:
         record = record_into(recorder, servo, session.world)
 
         def observe(ticks: Any, frames: Any, n: int) -> None:

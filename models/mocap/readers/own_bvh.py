@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry.arrays import Array
+from geometry.whole_files import atomic_file
 from models.errors import ModelError
 from models.humanoid.skeleton import DEFAULT_STATURE, SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
@@ -91,16 +92,16 @@ def write_bvh_blocks(
         If the file cannot be written.
     """
     written, last = 0, None
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    with atomic_file(path) as file:
         header = [*_hierarchy(stature), "MOTION", f"Frames: {n_frames}", f"Frame Time: {1.0 / fps!r}"]
-        file.write("\n".join(header) + "\n")
+        file.write(("\n".join(header) + "\n").encode())
         for poses in blocks:
             angles = _joint_angles(poses, last)
             rows = np.hstack((poses[:, _TO_FILE] * _CENTIMETRES, np.rad2deg(angles)))
-            file.writelines(" ".join(f"{value:.9f}" for value in row) + "\n" for row in rows)
+            file.writelines((" ".join(f"{value:.9f}" for value in row) + "\n").encode() for row in rows)
             written, last = written + len(poses), angles[-1:]
-    if written != n_frames:
-        raise ModelError(f"{path}: {written} frames were given; expected {n_frames}")
+        if written != n_frames:
+            raise ModelError(f"{path}: {written} frames were given; expected {n_frames}")
 
 
 def _joint_angles(poses: Array, last: Array | None) -> Array:

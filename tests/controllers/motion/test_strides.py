@@ -5,7 +5,7 @@ import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.motion.loops import checked_clip, closed_loop
-from controllers.motion.strides import fit_to_lap, natural_lap, strides
+from controllers.motion.strides import _best_repeat_count, fit_to_lap, natural_lap, strides
 from tests.controllers.clips_for_maps import difference, stylus, swinging
 
 
@@ -102,3 +102,13 @@ def test_natural_lap_plays_all_clips_near_their_own_pace_if_possible():
     paces = [one.duration / lap for one in fit_to_lap(loops, lap)]
     np.testing.assert_allclose(paces, 1.0, atol=0.05)
     assert 3.0 <= lap <= 6.0
+
+
+def test_number_of_repeats_is_that_of_an_exhaustive_search():
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        durations, lap = np.exp(rng.uniform(-2.0, 2.0, rng.integers(1, 5))), float(np.exp(rng.uniform(-1.0, 3.0)))
+        faster = np.log(np.arange(1, 300)[:, None] * durations / lap)
+        best = 1 + np.maximum(-faster, 3.0 * faster).max(axis=1).argmin()
+        assert _best_repeat_count(durations, lap) == best
+    assert _best_repeat_count(np.array([1.0 / 120.0]), 86_400.0) == 10_368_000

@@ -19,6 +19,7 @@ from experiments.certify.certify import (
     FLIGHTS_PLOT,
     PAGE,
     PLOT,
+    REGION_PLOT,
     certified_rivers,
     certify_clip_into,
     certify_into,
@@ -26,7 +27,7 @@ from experiments.certify.certify import (
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.files import certificate_files
-from experiments.files.certificate_files import read_certificate, verify_certificate
+from experiments.files.certificate_files import OPTIONS, read_certificate, verify_certificate
 from experiments.setups.certified_law import uncertified_parts
 from models.mocap.library import embedded
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
@@ -252,3 +253,10 @@ def test_capture_certificate_lists_scaling_and_dropped_first_frame(rig, tmp_path
     assert "one unit becomes" in scaled
     cut = "walker.bvh: left out: the first frame, a pose that is not part of the motion"
     assert (cut in assumed) == (rig.leading == 1)
+
+
+def test_plots_and_options_of_a_replaced_certificate_are_removed(tmp_path):
+    for name in (CERTIFICATE, PAGE, PLOT, REGION_PLOT, OPTIONS, "mine.png"):
+        (tmp_path / name).write_text("{}")
+    certify_clip_into("walk", tmp_path, DEFAULT_CRITERIA)
+    assert {path.name for path in tmp_path.iterdir()} == {CERTIFICATE, PAGE, FLIGHTS_PLOT, "mine.png"}

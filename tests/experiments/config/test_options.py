@@ -34,6 +34,7 @@ from experiments.config.options import (
     with_options,
 )
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole_number
+from experiments.config.paths import load_config
 from experiments.config.run_config import (
     Clock,
     Figure,
@@ -41,7 +42,6 @@ from experiments.config.run_config import (
     Replay,
     RunConfig,
     User,
-    load_config,
 )
 from experiments.hardware.parts import served, session_of
 from experiments.setups.wiring import wire

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -10,7 +11,7 @@ from controllers.errors import ParameterError
 from experiments.cli import main
 from experiments.config.options import options_of, run_config, with_options
 from experiments.config.part import from_json, to_json
-from experiments.config.run_config import RunConfig
+from experiments.config.run_config import Does, RunConfig
 from experiments.setups.parts.hands import intent_of
 from experiments.studies.user_laws.report import lines, user_laws
 from sim.errors import SimError
@@ -34,6 +35,13 @@ def test_changed_configuration_keeps_or_replaces_the_person() -> None:
 
 def test_default_user_has_no_person() -> None:
     assert run_config().user.person is None
+
+
+@pytest.mark.parametrize("does", [kind for kind in get_args(Does) if kind not in ("turn", "lead")])
+def test_every_kind_of_hand_has_an_intent_of_a_person_and_a_line_in_the_docs(does: str) -> None:
+    intent = type(intent_of(run_config(user=does, person="median").user)).__name__
+    page = Path("docs/explanation/simulated-users.md").read_text(encoding="utf-8")
+    assert does == "push" or f"| {does} | `{intent}` |" in page
 
 
 @pytest.mark.parametrize(

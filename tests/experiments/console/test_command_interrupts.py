@@ -38,6 +38,43 @@ def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: flo
     return stderr
 
 
+WHERE_INTERRUPTS_ARE_LOST = {
+    "import": "import interrupted",  # which would turn it into another error
+    "destructor": """
+class Last:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
+
+Last()
+""",
+    "nowhere": "os.kill(os.getpid(), signal.SIGINT)",
+}
+
+
+@pytest.mark.parametrize("lost", WHERE_INTERRUPTS_ARE_LOST)
+def test_interrupt_that_would_be_lost_is_raised_a_little_later(lost: str, tmp_path: Path) -> None:
+    (tmp_path / "interrupted.py").write_text(
+        "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    done = True\n"
+        "except KeyboardInterrupt:\n    raise ImportError('initialization failed') from None\n"
+    )
+    script = f"""
+import os, signal, time
+from experiments.console import startup
+startup.handle_interrupts()
+try:
+    {WHERE_INTERRUPTS_ARE_LOST[lost].strip().replace(chr(10), chr(10) + "    ")}
+    time.sleep(60.0)
+except KeyboardInterrupt:
+    print("stopped")
+"""
+    completed = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, preexec_fn=_default_interrupt,
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": os.pathsep.join([str(Path.cwd()), str(tmp_path)])}, check=False,
+    )  # fmt: skip
+    assert (completed.stdout, completed.stderr) == ("stopped\n", "")
+
+
 @pytest.mark.slow
 def test_ctrl_c_leaves_a_valid_recording_and_names_the_next_command(tmp_path: Path) -> None:
     out = tmp_path / "run"

@@ -9,7 +9,7 @@ import pytest
 from controllers.errors import ParameterError
 from experiments.cli import main
 from experiments.config.options import run_config
-from experiments.config.run_config import load_config
+from experiments.config.paths import load_config
 from experiments.files.json_text import json_text
 from experiments.results.folder import config_of
 from experiments.setups.parts.defaults import resolved

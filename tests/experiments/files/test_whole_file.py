@@ -3,18 +3,23 @@
 import errno
 import resource
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from experiments.cli import main
 from experiments.files.device_files import save_device
+from experiments.files.figure_files import save_figure
 from experiments.files.map_files import write_arrays
 from experiments.lifting import lift_report
-from sim.compilation import whole_files as whole
-from sim.compilation.whole_files import atomic_file, write_text
+from geometry import whole_files as whole
+from geometry.whole_files import atomic_file, write_text
+from models.mocap.library import embedded
+from models.mocap.readers.own_bvh import write_bvh
 
 
 def test_file_appears_only_once_closed(tmp_path: Path) -> None:
@@ -60,17 +65,42 @@ def test_interrupted_write_keeps_the_old_content(tmp_path: Path, before: bytes |
     assert [entry.read_bytes() for entry in tmp_path.iterdir()] == ([] if before is None else [before])
 
 
-def test_text_for_which_the_disk_is_too_small_leaves_the_old_one(tmp_path: Path) -> None:
-    path, limits = tmp_path / "report.html", resource.getrlimit(resource.RLIMIT_FSIZE)
+def _write_plot(path: Path) -> None:
+    save_figure(Figure(), path)
+
+
+def _write_clip(path: Path) -> None:
+    write_bvh(embedded("walk"), path)
+
+
+def _write_gltf_clip(path: Path) -> None:
+    pytest.importorskip("pygltflib")
+    from experiments.export.gltf import write_gltf
+
+    write_gltf(embedded("walk"), path)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("report.html", lambda path: write_text(path, "new" * 1000)), ("clip.bvh", _write_clip),
+        ("clip.glb", _write_gltf_clip), ("plot.png", _write_plot),
+    ],
+)  # fmt: skip
+def test_content_for_which_the_disk_is_too_small_leaves_the_old_file(
+    tmp_path: Path, name: str, write: Callable[[Path], None]
+) -> None:
+    path, limits = tmp_path / name, resource.getrlimit(resource.RLIMIT_FSIZE)
     write_text(path, "old")
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
-        with pytest.raises(OSError, match="too large"):
-            write_text(path, "new" * 1000)
+        with pytest.raises(OSError, match="too large") as refused:
+            write(path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
+    assert refused.value.filename == str(path)
     assert path.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [path]
 

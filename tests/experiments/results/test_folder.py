@@ -22,15 +22,16 @@ def test_foreign_files_are_not_replaced_without_overwrite(name: str, tmp_path: P
     check_folder(tmp_path, overwrite=True)
 
 
-def test_figures_folder_is_removed_only_with_its_run(tmp_path: Path) -> None:
-    figures = tmp_path / "figures"
-    figures.mkdir()
-    (figures / "mine.tex").write_text("mine")
+def test_figures_and_films_are_removed_only_with_their_run(tmp_path: Path) -> None:
+    derived = [tmp_path / "figures" / "path.png", tmp_path / "film.mp4", tmp_path / "film.gif"]
+    derived[0].parent.mkdir()
+    for file in (*derived, tmp_path / "mine.mp4"):
+        file.write_text("mine")
     clear_folder(tmp_path)
-    assert (figures / "mine.tex").exists()
+    assert all(file.exists() for file in derived)
     (tmp_path / "run.h5").touch()
     clear_folder(tmp_path)
-    assert not figures.exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.mp4"]
 
 
 def test_study_refuses_a_folder_with_other_results(tmp_path: Path) -> None:

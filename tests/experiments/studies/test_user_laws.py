@@ -7,9 +7,13 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
+from experiments.studies.user_laws.bare_device import End, trial
 from experiments.studies.user_laws.law import Law
 from experiments.studies.user_laws.report import STUDIES, TABLE, user_laws
 from experiments.studies.user_laws.tracing import natural_times
+from sim.errors import SimError
+from sim.users.person.population import population
+from sim.users.person.wishes import Wishes, following
 
 PANELS = (1001, 1002, 1003)
 """Seeds of populations; numbers of people were chosen on those of seeds 1 to 6, 101, 201 and 202."""
@@ -70,3 +74,16 @@ def test_natural_pace_of_an_ellipse_is_harmonic() -> None:
     even = np.interp(np.linspace(0.0, length[-1], 257), length, angle)
     points = np.stack([0.04 * np.cos(even), 0.02 * np.sin(even)], axis=1)
     np.testing.assert_allclose(natural_times(points, 2.0 * np.pi), even, atol=0.06)
+
+
+def test_trial_ends_at_the_slip_and_refuses_a_device_that_lets_go() -> None:
+    person, still = population(1, 1)[0], Wishes(following(np.zeros((2, 3))))
+    pushes = np.zeros((3000, 3))
+    pushes[500:, 0] = 8.0  # [N], under which this hand gives way
+    slipped = trial(person, still, 3.0, 1, np.zeros(3), pushes, End(slip=0.02))
+    assert 0.5 < slipped.t[-1] < 3.0
+    assert np.linalg.norm(slipped.p[-2:], axis=1) == pytest.approx(0.02, abs=2e-3)
+    assert trial(person, still, 1.0, 1, np.zeros(3), end=End(slip=0.02)).t[-1] == pytest.approx(1.0)
+    pushes[500] = np.nan
+    with pytest.raises(SimError, match=r"let go of a person after 0\.500 s of a trial: the field requested a force"):
+        trial(person, still, 3.0, 1, np.zeros(3), pushes)

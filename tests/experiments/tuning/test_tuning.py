@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -14,7 +15,7 @@ from controllers.certificates.report import Verdict
 from controllers.errors import ParameterError
 from experiments.certify.cached_stability import Stability, cached_stability
 from experiments.config.options import run_config
-from experiments.config.run_config import load_config
+from experiments.config.paths import load_config
 from experiments.trials.design.study_config import StudyError, Where
 from experiments.trials.execution.database import Database
 from experiments.trials.execution.executors import Threads
@@ -24,7 +25,7 @@ from experiments.tuning import tune as tuning_from_python
 from experiments.tuning.panel import Panel
 from experiments.tuning.search import Candidate, best_candidate, pareto_front, search, storage_of, violation_of
 from experiments.tuning.tune import TunedSimulation, _study_name
-from experiments.tuning.tune_config import TuneConfig, check_tuning, read_tuning
+from experiments.tuning.tune_config import Sampler, TuneConfig, check_tuning, read_tuning
 from experiments.tuning.tuning import CHOSEN, run_tuning
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples/studies"
@@ -63,6 +64,14 @@ def test_refuted_candidates_are_never_simulated(tmp_path: Path) -> None:
     assert refused
     assert all(c.state == "refused" and c.objectives is None and c.verdict == "refuted" for c in refused)
     assert sum(c.state != "refused" for c in found) == 11
+
+
+@pytest.mark.parametrize("name", get_args(Sampler))
+def test_every_search_method_has_its_sampler_and_is_documented(name: str) -> None:
+    assert searching.sampler_of(name, 1, 0) is not None
+    assert f'"{name}"' in str(hvf.Search.__doc__)
+    line = next(line for line in Path("docs/how-to/tuning.md").read_text().splitlines() if line.startswith("sampler ="))
+    assert name in line
 
 
 @pytest.mark.usefixtures("certificates")

@@ -13,8 +13,8 @@ from numba import njit
 
 from sim.compilation import unit_cache
 from sim.compilation.compiled import entry_point
+from sim.compilation.hashed_files import read_hashed, write_hashed
 from sim.compilation.unit_cache import is_sound, remove_forgotten
-from sim.compilation.whole_files import read_hashed, write_hashed
 
 ROOT = Path(unit_cache.__file__).parent.parent
 TOYS = Path(__file__).parent / "toy_kernels.py"

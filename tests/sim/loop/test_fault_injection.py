@@ -19,7 +19,7 @@ from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import PHANTOM
 from sim.devices.device import read_device
 from sim.devices.exchange import READING_CLOCK, READING_THETA, exchange
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import rearm_servo, run_block
 from sim.users.hand.actions import Grab
 from sim.users.hand.arm import Arm

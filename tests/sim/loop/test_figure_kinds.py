@@ -15,7 +15,7 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import wire
 from models.world.scene import FIGURE, device_world_model, world_model
 from sim.errors import SimError
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs
 from sim.loop.servo import run_block
 from sim.recording.recording import Recording
 from sim.world.world import World

@@ -19,8 +19,8 @@ from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import R_HP, jacobian
 from models.world.scene import SceneConfig
 from sim.errors import SimError
-from sim.loop.channels import tick_channels
-from sim.loop.loop import Loop, make_logs
+from sim.loop.channels import make_logs, tick_channels
+from sim.loop.loop import Loop
 from sim.loop.servo import run_block
 from sim.users.hand.arm import Arm
 from sim.world.encoders import PEAK_TORQUE

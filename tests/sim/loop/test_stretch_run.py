@@ -113,8 +113,8 @@ def test_bent_curve_is_saved_loaded_and_drawn(stretch_run, tmp_path) -> None:
     np.testing.assert_allclose(loaded.point(phases), bent.point(phases), atol=1e-12)
     assert loaded.periodic
     servo = session.servo
-    with Recorder(tmp_path / "run.h5", {}, 1, groups(servo), session.static()) as recorder:
-        names = groups(servo)["ticks"].channels
+    with Recorder(tmp_path / "run.h5", {}, 1, groups(servo, session.world), session.static()) as recorder:
+        names = groups(servo, session.world)["ticks"].channels
         recorder.append("ticks", {name: recorded["p"] if name == "p" else np.zeros((len(recorded["p"]), *shape))
                                   for name, shape in names.items()})  # fmt: skip
     with Recording(tmp_path / "run.h5") as recording:

@@ -10,7 +10,7 @@ from experiments.cli import main, parse_command
 @pytest.mark.usefixtures("without_page")
 def test_default_pushes_are_in_the_resolved_configuration(tmp_path: Path) -> None:
     """Default pushes are written out, so that a run of the file repeats them."""
-    from experiments.config.run_config import load_config
+    from experiments.config.paths import load_config
     from experiments.setups.parts.defaults import resolved
 
     out = tmp_path / "pushed"

@@ -11,8 +11,7 @@ from experiments.setups.wiring import wire
 from models.humanoid.skeleton import rest_pose
 from models.world.scene import PHANTOM
 from sim.errors import SimError
-from sim.loop.channels import tick_channels
-from sim.loop.loop import make_logs
+from sim.loop.channels import make_logs, tick_channels
 from sim.loop.servo import run_block
 from sim.users.hand.actions import Turn, turn_table
 from sim.users.hand.arm import Arm
