@@ -9,6 +9,7 @@ from numba import njit
 from controllers.checks import check_field_types, checked
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import Trajectory, curve_acceleration, curve_point, curve_velocity
+from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import write_trace
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.weights import window
@@ -39,7 +40,7 @@ def parallel_pace(
 
 
 class FollowGains(NamedTuple):
-    """Parameters of `follow_wrench`: k_r [N/m], b_d [N s/m], 1/ε² [1/m²], and 1 for a parallel flow, else 0."""
+    """Parameters of `follow_wrench`: k_r [N/m], b_d [N s/m], 1/ε² [1/m²], and ρ of a parallel flow, else 0."""
 
     k_r: float
     b_d: float
@@ -63,7 +64,7 @@ def follow_at(
     w, pace = window(distance * distance * gains.inverse_square), 1.0
     if gains.parallel != 0.0 and v_curve != (0.0, 0.0, 0.0):
         pace = parallel_pace(p, p_curve, v_curve, curve_acceleration(params, curve, phase))
-        pace = min(max(pace, PACE_RANGE[0]), PACE_RANGE[1])
+        pace = min(max(1.0 + gains.parallel * (pace - 1.0), PACE_RANGE[0]), PACE_RANGE[1])
     for i in range(3):
         wrench[i] = w * follow_force(p[i], v[i], p_curve[i], pace * v_curve[i], gains.k_r, gains.b_d)
         wrench[i + 3] = 0.0
@@ -92,8 +93,10 @@ class Follow(Law):
 
     γ is 1, as in the paper. A hand that is pushed to the outside of a bend then takes longer for the same angle: its
     t* advances at :math:`\dot t^* = \dot p\cdot\dot\varphi\,/\,(|\dot\varphi|^2 - (p - \varphi)\cdot\ddot\varphi)`. A
-    *parallel* flow has γ = 1 − (p − φ)·φ̈/|φ̇|², the speed along the parallel curve through p (1 − κe in path
-    following: Samson 1995), with which t* advances at rate 1 on either side; γ is clamped between 0.5 and 1.5.
+    *parallel* flow has γ = 1 − ρ (p − φ)·φ̈/|φ̇|², with ρ = 1 the speed along the parallel curve through p (1 − κe in
+    path following: Samson 1995), with which t* advances at rate 1 on either side; γ is clamped between 0.5 and 1.5.
+    Where φ is timed faster than the hand shall go, to compensate for friction, 1 − ρ is that part of its speed:
+    friction does not grow with the radius.
 
     Parameters
     ----------
@@ -108,11 +111,13 @@ class Follow(Law):
         everywhere and is hardly weakened near the curve (2 % at 2 cm).
     parallel : bool
         Whether the flow is parallel, so that a hand that is pushed off the curve keeps its pace.
+    compensation : float
+        1 − ρ: share of the curve's speed that compensates for friction, from 0 to below 1; for a parallel flow only.
 
     Raises
     ------
     ParameterError
-        If a gain is negative or not finite, or ε below 1e-4 m.
+        If a gain is negative or not finite, ε below 1e-4 m, or the compensation out of its interval.
     """
 
     curve: Trajectory
@@ -120,12 +125,15 @@ class Follow(Law):
     b_d: float
     epsilon: float = 0.25
     parallel: bool = False
+    compensation: float = 0.0
 
     def __post_init__(self) -> None:
         check_field_types(self)
         checked("k_r", self.k_r, "N/m")
         checked("b_d", self.b_d, "N s/m")
         checked("epsilon", self.epsilon, "m", least=1e-4, infinite=True)
+        if checked("compensation", self.compensation, "") >= 1.0:
+            raise ParameterError(f"compensation must be below 1, got {self.compensation:g}")
 
     def _compose(self) -> Program:
         return Program.of(self, follow_wrench, self.gains, [np.nan], self.curve)
@@ -133,4 +141,9 @@ class Follow(Law):
     @property
     def gains(self) -> FollowGains:
         """Parameters of the kernel."""
-        return FollowGains(self.k_r, self.b_d, self.epsilon**-2, float(self.parallel))
+        return FollowGains(self.k_r, self.b_d, self.epsilon**-2, self.parallel_share)
+
+    @property
+    def parallel_share(self) -> float:
+        """ρ of a parallel flow, and 0 of the paper's."""
+        return (1.0 - self.compensation) * self.parallel

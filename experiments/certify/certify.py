@@ -11,11 +11,12 @@ from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, Judgemen
 from controllers.certificates.loop.energy import energy
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import FOLLOW_LAW, LAWS, PARALLEL_LAW
+from controllers.certificates.loop.laws import LAWS, FollowForce, Law, follow_law
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, without_laws
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
@@ -26,6 +27,7 @@ from experiments.certify.certified_field import (
     certified_curves,
     certified_options,
     certified_sampling,
+    given_curves,
 )
 from experiments.certify.certified_leading import certify_leading, leading_field, leading_regimes, leading_river
 from experiments.certify.certified_rivers import certify_rivers
@@ -40,6 +42,7 @@ from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.certified_law import certified_laws, governor_drag, uncertified_parts
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.defaults import resolved
+from experiments.setups.parts.pace import compensation
 from geometry.whole_files import write_text
 from models.humanoid.skeleton import DEFAULT_STATURE
 from models.mocap.library import embedded_names, load
@@ -61,12 +64,17 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     ParameterError
         If a number is out of its interval.
     """
-    curves, sampling = certified_curves(config), certified_sampling(config, delay)
+    course, sampling = certified_curves(config)[""], certified_sampling(config, delay)
     device = phantom_device(linkage_of(config.device))
     return {
-        name: River(LAWS[law], stiffness, damping, width, curves[""], device, sampling)
+        name: River(_symbolic_law(law, config, course), stiffness, damping, width, course, device, sampling)
         for name, (law, stiffness, damping, width) in certified_laws(config).items()
     }
+
+
+def _symbolic_law(name: str, config: RunConfig, course: Trajectory) -> Law:
+    """A law of a run by its name in `certified_laws`."""
+    return follow_law(1.0 - compensation(given_curves(config)[""], course)) if name == "parallel" else LAWS[name]
 
 
 def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:
@@ -80,7 +88,7 @@ def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: fl
         verdicts["passivity" + name] = passivity(river)
         ceiling = ForceLimiter(river.sampling.period).peak
         verdicts["region" + name] = region(river, hands, ceiling, verdicts["stability" + name])
-        if river.law in (FOLLOW_LAW, PARALLEL_LAW):
+        if isinstance(river.law.force, FollowForce):
             verdicts["energy" + name] = energy(river, push, ceiling)
     if drag > 0.0:
         for name in verdicts:

@@ -11,7 +11,7 @@ from controllers.certificates.loop.added_laws import rivers_with
 from controllers.certificates.loop.governed import governed_stability, with_damper
 from controllers.certificates.loop.hand import HandImpedance, HandRange
 from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, follow_law
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
@@ -152,8 +152,7 @@ def _check_executed(
 def _certified_river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
     """The law that leads along a curve, in the form that is certified."""
     if isinstance(law, Follow):
-        base = PARALLEL_LAW if law.parallel else FOLLOW_LAW
-        k_r, b_d, width = law.k_r, law.b_d, law.epsilon
+        base, k_r, b_d, width = follow_law(law.parallel_share), law.k_r, law.b_d, law.epsilon
     else:
         base, (k_r, b_d, width) = BUNNY_LAW, law.felt
         if law.attraction == "along":

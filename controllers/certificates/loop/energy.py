@@ -204,14 +204,14 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
 def _power_figures(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
     """Figures on power and energy of a lap, for the ideal law and the executed one."""
     pace, speed, friction = _curve_speed(moving), terminal_speed(river, moving), drag(river, moving)
-    lap = river.curve.duration
+    lap, widening = river.curve.duration, PACE_RANGE[1] if river.law.parallel > 0.0 else 1.0
     return {
         "phases": river.phases(),
         "pace": pace,
         "terminal_speed": speed,
         "lap_energy": float(np.mean((friction.viscous * speed + friction.coulomb) * pace)) * lap,
         "lap_energy_bound": river.b_d * float(np.mean(pace**2)) * lap,
-        "power_bound": river_power(river.b_d, (PACE_RANGE[1] if river.law.parallel else 1.0) * float(np.max(pace))),
+        "power_bound": river_power(river.b_d, widening * float(np.max(pace))),
         "passive_below": executed.passive_below,
         **{f"activity_{band:g}": found for band, found in zip(BANDS, executed.activity, strict=True)},
         "rounding_force": executed.rounding,

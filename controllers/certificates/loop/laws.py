@@ -1,7 +1,7 @@
 """Force laws on CasADi symbols, built from the same kernels that the servo executes."""
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi
@@ -27,14 +27,14 @@ class Law(NamedTuple):
         displacement along the curve.
     carries : bool
         Whether the hand is driven along the curve; otherwise it comes to rest.
-    parallel : bool
-        Whether its flow is that of parallel curves (`controllers.fields.follow.Follow`).
+    parallel : float
+        ρ of a flow along parallel curves (`controllers.fields.follow.Follow`), else 0.
     """
 
     force: Callable[..., Symbol]
     slides: bool
     carries: bool
-    parallel: bool = False
+    parallel: float = 0.0
 
 
 def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
@@ -43,16 +43,29 @@ def nearest_phase(p: Symbol, piece: Symbol, u: Symbol) -> Symbol:
     return u - slope / casadi.jacobian(slope, u)
 
 
-def _follow(
-    p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol, parallel: bool = False
-) -> Symbol:
-    """FOLLOW, attracted by the nearest point; a parallel flow within the distance at which γ is not clamped."""
-    nearest, pace = nearest_phase(p, piece, u), 1.0
-    p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
-    if parallel:
-        pace = parallel_pace.py_func(p, p_curve, v_curve, piece_acceleration.py_func(piece, 0, nearest))
-    w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
-    return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], pace * v_curve[i], k_r, b_d) for i in range(3)])
+@dataclass(frozen=True)
+class FollowForce:
+    """Force of FOLLOW, attracted by the nearest point; a parallel flow within the distance at which γ is not clamped.
+
+    Attributes
+    ----------
+    parallel : float
+        As in `Law`.
+    """
+
+    parallel: float
+
+    def __call__(
+        self, p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol
+    ) -> Symbol:
+        """The force, with the arguments of `Law.force`."""
+        nearest, pace = nearest_phase(p, piece, u), 1.0
+        p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
+        if self.parallel > 0.0:
+            abreast = parallel_pace.py_func(p, p_curve, v_curve, piece_acceleration.py_func(piece, 0, nearest))
+            pace = 1.0 + self.parallel * (abreast - 1.0)
+        w = window.py_func(casadi.sumsqr(vector(p_curve) - p) * width)
+        return w * vector([follow_force.py_func(p[i], v[i], p_curve[i], pace * v_curve[i], k_r, b_d) for i in range(3)])
 
 
 def _bunny(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol) -> Symbol:
@@ -74,12 +87,16 @@ def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
 
 
-FOLLOW_LAW = Law(_follow, slides=True, carries=True)
-PARALLEL_LAW = Law(partial(_follow, parallel=True), slides=True, carries=True, parallel=True)
+def follow_law(parallel: float) -> Law:
+    """FOLLOW with the share ρ of a parallel flow; 0 for the paper's."""
+    return Law(FollowForce(parallel), slides=True, carries=True, parallel=parallel)
+
+
+FOLLOW_LAW = follow_law(0.0)
 BUNNY_LAW = Law(_bunny, slides=False, carries=True)
 SEEK_LAW = Law(_seek, slides=True, carries=False)
 HOLD_LAW = Law(_hold, slides=False, carries=False)
-LAWS = {"follow": FOLLOW_LAW, "parallel": PARALLEL_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
+LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
 
 
 def torque_function(device: Device, law: Law) -> Any:

@@ -41,12 +41,12 @@ class River(NamedTuple):
 
     @property
     def shear(self) -> float:
-        """Largest change of the flow's speed across the curve [1/s]: |φ̇|κ for a parallel flow, 0 for any other."""
-        if not self.law.parallel:
+        """Largest change of the flow's speed across the curve [1/s]: ρ|φ̇|κ for a parallel flow, 0 for any other."""
+        if self.law.parallel == 0.0:
             return 0.0
         phases = self.phases(_FINE_PHASE_COUNT)
         speed = np.linalg.norm(self.curve.velocity(phases), axis=1)
-        return float((speed * np.where(speed > 0.0, self.curve.curvature(phases), 0.0)).max())
+        return self.law.parallel * float((speed * np.where(speed > 0.0, self.curve.curvature(phases), 0.0)).max())
 
     def phases(self, n: int = N_PHASES) -> Array:
         """Equally spaced phases of the curve [s]: all around a closed curve, or inside the ends of an open one."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import FOLLOW_LAW, HOLD_LAW, PARALLEL_LAW, SEEK_LAW
+from controllers.certificates.loop.laws import HOLD_LAW, SEEK_LAW, FollowForce
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.decrease_check import Checked, check_form
 from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, find_form
@@ -215,7 +215,7 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
     if linear.verdict == "refuted":
         reason = "no region: the loop is unstable on the curve itself"
         return Verdict("refuted", reason, -1.0, (), linear.counterexample)
-    if river.law not in (FOLLOW_LAW, PARALLEL_LAW, SEEK_LAW, HOLD_LAW):
+    if not isinstance(river.law.force, FollowForce) and river.law not in (SEEK_LAW, HOLD_LAW):
         return Verdict("unknown", "a region is sought only about curves whose nearest point attracts, and points")
     if river.sampling.rest_delay > 0.0 or river.k_r <= 0.0 or river.b_d <= 0.0:
         return Verdict("unknown", "a region needs a stiffness, a damping, and a delay of whole periods")

@@ -31,7 +31,7 @@ class Course(NamedTuple):
     """Curve data: largest and smallest pace [m/s], curvature [1/m], largest |φ̈| [m/s²], largest |cos| between φ̇ and φ̈.
 
     For a law that does not carry the hand, largest pace and |φ̈| are zero. The last is the largest change of the flow's
-    speed across the curve [1/s]: |φ̇|κ for a parallel flow, else 0.
+    speed across the curve [1/s]: ρ|φ̇|κ for a parallel flow, else 0.
     """
 
     pace: float

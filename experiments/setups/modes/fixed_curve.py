@@ -24,7 +24,7 @@ from experiments.results.measures.run_measures import trace_summary
 from experiments.setups.parts.budget import fastest, tank_for
 from experiments.setups.parts.governor import governed
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
-from experiments.setups.parts.pace import course_of
+from experiments.setups.parts.pace import compensation, course_of
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
@@ -143,7 +143,9 @@ def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
     parallel = mode.flow == "parallel"
     # With a parallel flow a hand that runs outside a bend needs no course that is faster there.
     course = course_of(maps.curve, mode.damping, 0.0 if parallel else mode.stiffness)
-    law = FollowLaw(course, mode.stiffness, mode.damping, mode.tube, parallel)
+    law = FollowLaw(
+        course, mode.stiffness, mode.damping, mode.tube, parallel, compensation(maps.curve, course) * parallel
+    )
     law, urged = governed(mode.governor, law, course, maps)
     power = river_power(mode.damping, (PACE_RANGE[1] if parallel else 1.0) * fastest(course))
     springs = ((mode.stiffness, mode.tube),)

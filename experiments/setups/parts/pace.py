@@ -136,6 +136,11 @@ def paced(curve: Trajectory, drag: float, stiffness: float) -> Trajectory:
     return Trajectory(times[0] + np.append(0.0, np.cumsum(steps)), curve.positions, periodic=curve.periodic)
 
 
+def compensation(curve: Trajectory, course: Trajectory) -> float:
+    """Share of the speed of `course_of` a curve that compensates for friction and inertia, on average; 0 or more."""
+    return max(0.0, 1.0 - course.duration / curve.duration)
+
+
 def check_reach(curve: Trajectory) -> Trajectory:
     """The same curve, checked to lie within the Phantom's reach.
 

@@ -86,6 +86,15 @@ def test_parallel_flow_turns_with_the_circle_up_to_its_bounds(radius, pace):
     np.testing.assert_allclose(force, [200.0 * (0.05 - radius), 4.0 * pace * SPEED, 0.0], atol=1e-4)
 
 
+def test_a_parallel_flow_does_not_scale_what_compensates_for_friction():
+    # A hand 10 mm outside a circle has 1.2 of its speed; a friction of 0.1 N takes 0.1/4 m/s, wherever the hand is.
+    friction, b_d = 0.1, 4.0
+    course = Trajectory.circle(0.05, 4.0 * SPEED / (SPEED + friction / b_d))
+    law = Follow(course, 200.0, b_d, np.inf, True, compensation=friction / b_d / (SPEED + friction / b_d))
+    hand = HandState.at(np.array([0.06, 0.0, 0.0]), np.array([0.0, 1.2 * SPEED, 0.0]))
+    assert law.wrench(hand).force[1] == pytest.approx(friction, abs=1e-4)
+
+
 def test_force_is_continuous_along_lines_through_the_tube():
     rng = np.random.default_rng(1)
     # A tube inside the reach: there the closest point is unique, so the law must be continuous everywhere.

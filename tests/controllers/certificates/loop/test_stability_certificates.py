@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from controllers.certificates.loop.energy import distance_bound, energy, peak_gain, terminal_speed
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance, HandRange
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, PARALLEL_LAW, SEEK_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW, follow_law
 from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.passivity import damping_needed, passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop, exponentials
@@ -69,7 +69,7 @@ def test_linearised_law_matches_finite_differences_of_the_kernels(kind):
     if kind == "follow":
         law, symbolic, width = Follow(CIRCLE, 300.0, 4.0, 0.25), FOLLOW_LAW, 0.25
     elif kind == "parallel":
-        law, symbolic, width = Follow(CIRCLE, 300.0, 4.0, 0.25, parallel=True), PARALLEL_LAW, 0.25
+        law, symbolic, width = Follow(CIRCLE, 300.0, 4.0, 0.25, True, 0.3), follow_law(0.7), 0.25
     else:
         law, symbolic, width = Bunny(CIRCLE, 300.0, 4.0, 0.02, pace="clock"), BUNNY_LAW, 0.02
     linear = linearise(DEVICE, symbolic, CIRCLE, PHASES, NO_HAND, width)
@@ -293,7 +293,7 @@ def test_distance_bound_solves_its_fixed_point_equation():
 
 
 def test_parallel_flow_has_larger_power_and_distance_bounds():
-    paper, parallel = energy(RIVER, 1.0, 8.5), energy(RIVER._replace(law=PARALLEL_LAW), 1.0, 8.5)
+    paper, parallel = energy(RIVER, 1.0, 8.5), energy(RIVER._replace(law=follow_law(1.0)), 1.0, 8.5)
     assert parallel.verdict == "certified"
     rng, speed = np.random.default_rng(3), 2.0 * np.pi * 0.0477 / 4.0
     law, most = Follow(CIRCLE, 0.0, 4.0, np.inf, parallel=True), 0.0
@@ -302,7 +302,7 @@ def test_parallel_flow_has_larger_power_and_distance_bounds():
         most = max(most, float(law.wrench(HandState.at([rng.uniform(0.01, 0.15), 0.0, 0.0], along)).force @ along))
     assert 0.98 * parallel.figures["power_bound"] < most <= parallel.figures["power_bound"]
     assert parallel.figures["distance_bound"] > paper.figures["distance_bound"]
-    assert RIVER._replace(law=PARALLEL_LAW).shear == pytest.approx(2.0 * np.pi / 4.0, rel=1e-2)
+    assert RIVER._replace(law=follow_law(1.0)).shear == pytest.approx(2.0 * np.pi / 4.0, rel=1e-2)
     assert RIVER.shear == 0.0
 
 

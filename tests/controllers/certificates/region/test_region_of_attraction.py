@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from controllers.certificates.loop.device import kinematics_function, plant_function
 from controllers.certificates.loop.hand import NO_HANDS, HandRange
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, PARALLEL_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, follow_law
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.decrease_check import check_form
@@ -175,7 +175,7 @@ def test_demo_river_in_a_firm_hand_has_a_certified_region(lap):
 
 @pytest.mark.slow
 def test_parallel_gate_has_a_larger_force_remainder():
-    good, parallel = firm_region(4.0), firm_region(4.0, PARALLEL_LAW)
+    good, parallel = firm_region(4.0), firm_region(4.0, follow_law(1.0))
     assert parallel.verdict == "certified"
     assert good.figures["remainder_force"] < parallel.figures["remainder_force"]
 
