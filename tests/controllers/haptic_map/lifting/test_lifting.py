@@ -148,7 +148,7 @@ def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_th
     share = np.interp(transition.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
-    assert meeting.distance < 7e-3  # 3.1 mm if curves may slant without a penalty
+    assert meeting.distance < 5e-3
     assert np.degrees(meeting.slant) < 10.0
     assert found.after.separation >= ROOM.separation
     # Before the arrangement the curves were far apart there too.
@@ -305,11 +305,10 @@ def test_slow_and_fast_curves_are_level():
         along = 2.5 / 8.0 * np.linalg.norm(slopes, axis=2) / sites[..., 0]
         paces.append((along / (rate * sites[..., 0])).max())
     slow, middle, faster, fast = bends
-    assert middle > 1e-3
+    assert middle > 3e-3
     assert faster < 0.5 * middle
     assert max(slow, fast) < 0.1 * middle
-    assert max(paces) < 0.2
-    assert paces[0] < 0.01
+    assert paces[0] < 0.02 < 0.2 < paces[1]
 
 
 @pytest.mark.slow
