@@ -11,8 +11,8 @@ from experiments.config.maps import Composite, Cylindrical, Led, Map, MapFile, R
 DEFAULT_LAP = 4.0
 """Duration of a lap [s] about a map's circle that plays embedded clips only, or none."""
 
-# [m/s] With b of 8 N s/m the Phantom's friction of some 50 mN lags a hand by 6 mm/s. The flow compensates for that along
-# its curve; the friction of a hand that is pushed aside is along its own path: at 4 mm/s its pace was 1.14.
+# [m/s] With b of 8 N s/m the Phantom's friction of some 50 mN lags a hand by 6 mm/s. The flow compensates for it along
+# the curve, but a hand that is pushed aside has its friction along its own path: at 4 mm/s its pace was 1.14.
 _MIN_STEADY_SPEED = 0.012
 
 
