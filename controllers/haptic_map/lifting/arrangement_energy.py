@@ -55,7 +55,7 @@ _MIN_DISTANCE_RATIO = 0.2
 # way between two curves, 26.8, changes by 0.7, with the bend weight by 3.9.
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
 # [s] Longest laps between which s goes from 0 to 1. A push changes the pace of a captured kick of 7 s by 8 % instead of
-# 236 %. Fast curves keep the slants by which they meet: else a figure falls that goes from the embedded run to the walk.
+# 236 %. Maps of fast clips keep their slants: with level curves a figure fell that went from embedded run to walk.
 _SLOW_LAPS = (4.0, 6.0)
 PUSH_SPEED = 2.5 / 8.0
 """Speed that a push of 2.5 N adds against a damping of 8 N s/m [m/s]."""
