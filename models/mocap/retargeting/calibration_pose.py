@@ -8,9 +8,8 @@ Between the pose and the motion is one step, v₀, that the motion does not cont
 - a body with straight legs and straight arms at least 30° off the trunk, symmetric as T- and A-poses are, whose step
   does not continue in the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
-  interpolation has spread the one step. If the steps become smaller, for 5 frames at any rate: a filter counts frames,
-  and no body begins at its highest speed;
-- steps that fade within 0.1 s or 5 frames after such a jump, followed by calm: a filter has spread the jump, too;
+  interpolation has spread the one step;
+- steps that fade within 0.1 s after such a jump, followed by calm: a filter has spread the jump in this case, too;
 - a first step as large as that of a broken frame at the end of a motion (`broken_frames.first_step_jumps`).
 
 The jump is sought in the first quarter of a motion. If a pose is held without any change, as no living body stands, the
@@ -39,9 +38,6 @@ _MIN_JUMP_ANGLE = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no b
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it continues.
 _MAX_BLEND_TIME, _MIN_BLEND_RATIO = 0.1, 1.5
-# Longest filter of a jump at any rate [frames], and largest ratio of its last large step to its first: 5 and 0.25 to
-# 0.59 in three captures at 25 frames a second. Steps of a motion that is keyed to begin in its rest pose are equal.
-_MAX_FADING_STEPS, _MAX_FADING_RATIO = 5, 0.75
 # In a jump that fades: largest ratio of the steps after it to its first step, and least cosine between its steps (0.96
 # and more in six captures). No motion begins with three such steps.
 _MAX_CALM_RATIO, _MIN_STEP_COSINE = 0.4, 0.9
@@ -61,10 +57,10 @@ def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines
     turns = _rotation_vectors(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    longest = round(_MAX_BLEND_TIME * motion.fps)
-    jumped = _frames_before_jump(rotations, turns, at_rest, lines)
-    jumped = _frames_before_fade(turns, jumped, max(longest, _MAX_FADING_STEPS))
-    begun, ended = _find_blend(rotations, _rms_angle(turns), longest)
+    jumped = _frames_before_fade(
+        turns, _frames_before_jump(rotations, turns, at_rest, lines), round(_MAX_BLEND_TIME * motion.fps)
+    )
+    begun, ended = _find_blend(rotations, _rms_angle(turns), round(_MAX_BLEND_TIME * motion.fps))
     is_early = ended <= _MAX_POSE_FRACTION * motion.n_frames or _first_change(_rms_angle(turns)) == begun
     is_pose = is_early and (at_rest[: begun + 1].all() or _is_calibration_pose(lines))
     frames = max(jumped, ended) if is_pose else jumped
@@ -117,23 +113,15 @@ def _first_change(steps: Array) -> int:
 
 def _find_blend(rotations: Array, steps: Array, longest: int) -> tuple[int, int]:
     """First step, and the one after the last, of a jump by steps that are all larger than the motion's; else (0, 0)."""
-    most = max(longest, _MAX_FADING_STEPS)
-    if longest < 2 or len(steps) < max(MIN_FRAME_COUNT, 4 * most):
+    if longest < 2 or len(steps) < max(MIN_FRAME_COUNT, 4 * longest):
         return 0, 0
-    usual = float(np.quantile(np.sort(steps)[:-most], 0.99))
+    usual = float(np.quantile(np.sort(steps)[:-longest], 0.99))
     large = steps > _MIN_BLEND_RATIO * usual
     begun = int(np.argmax(large))
     ended = begun + int(np.argmin(np.append(large[begun:], False)))
-    if ended == begun:
-        return 0, 0
     burst = steps[begun:ended]
-    fades = len(burst) <= _MAX_FADING_STEPS and bool(burst[-1] < _MAX_FADING_RATIO * burst[0])
-    is_jump = (fades or len(burst) <= longest) and burst.sum() > 3.0 * _MIN_JUMP_ANGLE
-    if not (is_jump and _is_held(rotations, begun, burst.max())):
-        return 0, 0
-    # The filter's last steps may be as small as the motion's; the step after them is smaller still.
-    falls = np.diff(steps[ended - 1 : begun + _MAX_FADING_STEPS + 1]) < 0.0
-    return begun, ended + fades * max(0, int(np.argmin(np.append(falls, False))) - 1)
+    is_jump = len(burst) <= longest and burst.sum() > 3.0 * _MIN_JUMP_ANGLE
+    return (begun, ended) if is_jump and _is_held(rotations, begun, burst.max()) else (0, 0)
 
 
 def _rms_angle(turns: Array) -> Array:

@@ -102,14 +102,11 @@ def test_body_that_stands_still_and_then_walks_keeps_its_frames(tmp_path):
 
 
 @pytest.mark.parametrize("held", [0.0, 0.5])
-@pytest.mark.parametrize(
-    ("name", "fps", "n"),
-    [("walk", 120.0, 6), ("run", 120.0, 6), ("cheer", 60.0, 3), ("walk", 25.0, 5), ("cheer", 25.0, 5)],
-)
-def test_leading_arms_out_pose_blended_into_the_motion_is_dropped(name, held, fps, n, tmp_path):
-    """Blended over some frames, so that no step is large, after a hold of a multiple of the duration of the motion."""
-    clip = at_rate(name, fps)
-    pose = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1))
+@pytest.mark.parametrize("name", ["walk", "run", "cheer"])
+def test_leading_arms_out_pose_blended_into_the_motion_is_dropped(name, held, tmp_path):
+    """Blended over 0.05 s, so that no step is large, after a hold of a multiple of the duration of the motion."""
+    clip = embedded(name)
+    pose, n = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1)), round(0.05 * clip.fps)
     first = clip.poses[0, 3:].reshape(-1, 4)
     shares = np.append(np.zeros(round(held * clip.n_frames)), np.sin(np.pi / 2.0 * np.arange(n) / n))
     blended = [np.concatenate((clip.poses[0, :3], quaternions.slerped(pose, first, s).ravel())) for s in shares]
