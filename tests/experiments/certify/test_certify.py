@@ -29,10 +29,18 @@ from experiments.config.options import run_config
 from experiments.files import certificate_files
 from experiments.files.certificate_files import OPTIONS, read_certificate, verify_certificate
 from experiments.setups.certified_law import uncertified_parts
+from experiments.setups.wiring import wire
 from models.mocap.library import embedded
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 HANDS = HandRange((0.1, 0.1), (2.0, 2.0), (0.0, 0.0))
+
+
+def test_parallel_flow_is_certified_with_the_compensation_of_the_run():
+    config = run_config(flow="parallel", figure="none", lap=12.0)
+    (law,) = wire(config).parts.program.laws
+    assert 0.1 < law.compensation < 0.5
+    assert certified_rivers(config)[""].law.parallel == law.parallel_share == 1.0 - law.compensation
 
 
 @pytest.fixture(scope="module")

@@ -93,19 +93,24 @@ def test_unbearable_map_is_reported_with_the_best_legs(
     )
 
 
-@pytest.mark.parametrize(("parallel", "paces"), [(False, (1.0 / 1.178, 1.0 / 0.822)), (True, (1.0, 1.0))])
-def test_trial_hand_covers_the_whole_map(
-    parallel: bool, paces: tuple[float, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def toured(haptic_map: Cylindrical, lap: float, parallel: bool, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
+    """Coordinates (3, n) of the hand of a trial."""
     places: list[np.ndarray] = []
 
-    def record_points(haptic_map: Cylindrical, points: np.ndarray) -> np.ndarray:
+    def record_points(_: Cylindrical, points: np.ndarray) -> np.ndarray:
         places.append(points)
         return np.tile(embedded("walk").poses[0], (len(points), 1))
 
     monkeypatch.setattr(hand_tours, "map_poses", record_points)
-    tour_of_domain(maps[1], LAP, parallel)
-    x, y, z = places[0][:, :3].T
+    tour_of_domain(haptic_map, lap, parallel)
+    return places[0][:, :3].T
+
+
+@pytest.mark.parametrize(("parallel", "paces"), [(False, (1.0 / 1.178, 1.0 / 0.822)), (True, (1.0, 1.0))])
+def test_trial_hand_covers_the_whole_map(
+    parallel: bool, paces: tuple[float, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x, y, z = toured(maps[1], LAP, parallel, monkeypatch)
     r, angle = np.hypot(x, y), np.unwrap(np.arctan2(y, x))
     assert r[0] == pytest.approx(np.mean(R), abs=1e-6)
     for far, high in ((0, 0), (1, 0), (0, 1), (1, 1)):
@@ -119,15 +124,8 @@ def test_trial_hand_covers_the_whole_map(
 def test_trial_of_a_long_lap_meets_each_part_with_a_push_outwards_and_inwards(
     lap: float, maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    places: list[np.ndarray] = []
-
-    def record_points(haptic_map: Cylindrical, points: np.ndarray) -> np.ndarray:
-        places.append(points)
-        return np.tile(embedded("walk").poses[0], (len(points), 1))
-
-    monkeypatch.setattr(hand_tours, "map_poses", record_points)
-    tour_of_domain(maps[1], lap, parallel=False)
-    turns = np.unwrap(np.arctan2(places[0][:, 1], places[0][:, 0])) / (2.0 * np.pi)
+    x, y, _ = toured(maps[1], lap, False, monkeypatch)
+    turns = np.unwrap(np.arctan2(y, x)) / (2.0 * np.pi)
     pace, part = np.diff(turns) * 120.0 * lap, (turns[:-1] * 40.0).astype(int) % 40
     met = [pace[part == k].min() < 0.9 and pace[part == k].max() > 1.1 for k in range(40)]
     assert np.mean(met) > 0.8  # but where one push follows the other
