@@ -32,11 +32,12 @@ class Command:
         """Convert the file, and report how it was read."""
         from experiments.export.gltf import write_gltf
         from models.mocap.library import convert
+        from models.mocap.readers.formats import BVH, GLTF
         from models.mocap.readers.own_bvh import write_bvh
         from models.mocap.retargeting.hints import Hints
 
         hints = Hints(self.up, self.rest_frame, self.roles, self.frame_rate)
-        writers = {".bvh": write_bvh, ".glb": write_gltf}
+        writers = {BVH.suffix: write_bvh, GLTF.suffix: write_gltf}
         report = convert(self.source, self.target, self.overwrite, hints, writers).report
         own = "the figure's own skeleton: nothing to retarget"
         say(report or {"lines": [own]}, self.json, report.lines() if report else (own,))

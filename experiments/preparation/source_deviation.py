@@ -27,11 +27,11 @@ from geometry import quaternions
 from geometry.arrays import Array
 from geometry.quaternions import unit
 from models.humanoid.skeleton import BODIES
-from models.mocap.library import read_motion
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations, segment_positions
 from models.mocap.preparation.fidelity import common_frames
 from models.mocap.preparation.prepare import Prepared
+from models.mocap.readers.formats import read_motion
 from models.mocap.retargeting.body_lines import SIDES, body_lines
 from models.mocap.retargeting.retarget_report import RetargetReport
 from models.mocap.retargeting.skeleton_roles import roles_of

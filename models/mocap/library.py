@@ -12,10 +12,8 @@ from typing import NamedTuple, TypeAlias
 from models.errors import ModelError
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
-from models.mocap.readers.asf_amc import read_amc
-from models.mocap.readers.bvh import read_bvh
-from models.mocap.readers.deepmimic import read_deepmimic
-from models.mocap.readers.motion_file import MotionFileError, numbered_lines
+from models.mocap.readers.formats import BVH, WRITABLE, read_motion
+from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.own_bvh import own_clip, write_bvh
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.bodies import people_hips
@@ -25,9 +23,6 @@ from models.mocap.retargeting.retarget_report import RetargetReport, copy_remark
 from models.mocap.retargeting.role_file import stated_roles
 from models.mocap.retargeting.skeleton_roles import roles_of
 
-_FORMATS = "BVH, AMC (with its ASF beside it) or DeepMimic JSON"
-_AMBIGUOUS_SUFFIXES = ("", ".txt", ".json")  # suffixes that do not determine the format: it follows from the content
-_WRITABLE_FORMATS = {".bvh": "BVH", ".glb": "glTF"}
 Writer: TypeAlias = Callable[[Clip, Path], None]
 _CLIPS_FOLDER = files("models.mocap") / "clips"
 
@@ -79,7 +74,7 @@ def _read_embedded(name: str) -> Clip:
 
 
 def load_clip(path: Path) -> Clip:
-    """The motion in a BVH, AMC or DeepMimic file, on the figure; see `load`."""
+    """The motion in a file, on the figure; see `load`."""
     return load(path).clip
 
 
@@ -89,7 +84,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     Parameters
     ----------
     path : Path
-        BVH, AMC or DeepMimic.
+        File in one of the readable `formats`.
     hints : Hints or None
         Facts about the file that the user states in place of estimates.
 
@@ -139,30 +134,7 @@ def _check_single_person(motion: SourceMotion, people: Sequence[Sequence[int]]) 
     raise MotionFileError(motion.path, 1, f"there are {len(people)} people, with the hips {', '.join(hips)}", expected)
 
 
-def read_motion(path: Path) -> SourceMotion:
-    """The motion in a file on its own skeleton; the format follows from the suffix, or else from the first word.
-
-    Raises
-    ------
-    MotionFileError
-        If the file cannot be read.
-    """
-    suffix = path.suffix.lower()
-    if suffix == ".bvh":
-        return read_bvh(path)
-    if suffix == ".amc":
-        return read_amc(path)
-    if suffix not in _AMBIGUOUS_SUFFIXES:
-        raise MotionFileError(path, 0, f"{suffix} files are not read", _FORMATS)
-    start = next((text.strip() for _, text in numbered_lines(path) if text.strip()), "")
-    if start.upper().startswith("HIERARCHY"):
-        return read_bvh(path)
-    if start.startswith(("{", "[")):
-        return read_deepmimic(path)
-    raise MotionFileError(path, 1, "not a motion file", _FORMATS)
-
-
-def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",)) -> None:
+def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (BVH.suffix,)) -> None:
     """Check that a motion may be written to a file.
 
     Raises
@@ -172,7 +144,7 @@ def check_target(target: Path, overwrite: bool, ends: Sequence[str] = (".bvh",))
         overwritten.
     """
     if target.suffix.lower() not in ends:
-        formats = " and ".join(_WRITABLE_FORMATS[end] for end in ends)
+        formats = " and ".join(kind.name for kind in WRITABLE if kind.suffix in ends)
         raise ModelError(
             f"cannot write {target}: only {formats} can be written; expected a name that ends in {', '.join(ends)}"
         )
@@ -228,7 +200,7 @@ def convert(
     ModelError
         If no writer has the target's suffix, or the target cannot be written or exists and is not to be overwritten.
     """
-    writers = writers or {".bvh": write_bvh}
+    writers = writers or {BVH.suffix: write_bvh}
     check_target(target, overwrite, tuple(writers))
     loaded = load(source, hints)
     with writing(target):

@@ -13,7 +13,8 @@ from experiments.setups.parts.led_figure import led_map
 from experiments.setups.wiring import wire
 from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
-from models.mocap.library import embedded, load_clip, read_motion
+from models.mocap.library import embedded, load_clip
+from models.mocap.readers.formats import read_motion
 from sim.loop.loop import Loop
 
 SMALL, SIZE = 1.4, 0.8

@@ -15,6 +15,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import BODIES, rest_pose
 from models.mocap.library import embedded, embedded_names, load_clip
 from models.mocap.motion.clip import Clip, pose_difference
+from models.mocap.readers.formats import READABLE_SUFFIXES
 from models.mocap.readers.own_bvh import write_bvh
 from models.world.scene import SceneConfig
 from sim.reference.reference import map_poses
@@ -84,7 +85,7 @@ def recorded():
     """Clips of all motion files of the shared collection that can be read on the figure."""
     clips = []
     for path in sorted(MOCAP.rglob("*")):
-        if path.suffix.lower() in (".bvh", ".amc", ".txt", ".json"):
+        if path.suffix.lower() in READABLE_SUFFIXES:
             try:
                 clips.append(load_clip(path))
             except ModelError:

@@ -24,6 +24,10 @@ SLOTS = {
     "file": (),
 }
 """Roles of a map's clips, by kind of map."""
+UPLOAD_HINT = (
+    "A **BVH**, an **ASF** and then its **AMC**, or a **DeepMimic** motion: calibrated, put on the floor, looped "
+    "or at rest, made feasible on contact, as `hvf prepare` does. It is then the first of the clips under *Play*."
+)
 
 
 class RunPanel:
@@ -147,10 +151,7 @@ class UploadsPanel:
 
     def __init__(self, gui: viser.GuiApi, desk: Desk, acts: Acts):
         self._desk = desk
-        gui.add_markdown(
-            "A **BVH**, or an **ASF** and then its **AMC**: calibrated, put on the floor, looped or at rest, made "
-            "feasible on contact, as `hvf prepare` does. It is then the first of the clips under *Play*."
-        )
+        gui.add_markdown(UPLOAD_HINT)
         self._upload = gui.add_upload_button(
             f"Upload a motion (up to {MAX_UPLOAD_BYTES // 1_000_000} MB)", icon=viser.Icon.UPLOAD
         )

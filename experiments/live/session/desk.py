@@ -17,13 +17,14 @@ from experiments.live.session.gains import with_gain
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from geometry.arrays import Array
 from geometry.whole_files import atomic_file
+from models.mocap.readers.asf_amc import SKELETON_SUFFIX
+from models.mocap.readers.formats import READABLE_NAMES, UPLOADABLE_SUFFIXES
 from sim.errors import SimError
 
 HISTORY_DURATION = 60.0  # [s] of history that can be viewed again
 HISTORY_RATE = 30.0  # states stored per second of history
 UNATTENDED_TIMEOUT = 60.0  # [s] without a browser after which a take is ended: longer than it takes to reload the page
 MAX_UPLOAD_BYTES = 30_000_000  # largest motion file: about an hour of motion capture
-_MOTION_SUFFIXES = (".bvh", ".amc", ".asf", ".txt", ".json")
 
 
 class UndoableAction(NamedTuple):
@@ -300,8 +301,8 @@ class Desk:
             If it is too large or of an unsupported format, or another file is being prepared.
         """
         file = Path(name).name
-        if Path(file).suffix.lower() not in _MOTION_SUFFIXES:
-            raise SimError(f"{file} is no motion file; expected BVH, AMC (its ASF first) or DeepMimic's text")
+        if (suffix := Path(file).suffix.lower()) not in UPLOADABLE_SUFFIXES:
+            raise SimError(f"{file} is no motion file; expected {READABLE_NAMES}")
         if len(content) > MAX_UPLOAD_BYTES:
             raise SimError(
                 f"{file} has {len(content) / 1e6:.1f} MB; expected at most {MAX_UPLOAD_BYTES / 1e6:.0f} MB; "
@@ -313,7 +314,7 @@ class Desk:
         uploads.mkdir(parents=True, exist_ok=True)
         with atomic_file(uploads / file) as upload:
             upload.write(content)
-        if file.lower().endswith(".asf"):
+        if suffix == SKELETON_SUFFIX:
             self._say(f"{file}: the skeleton is kept; its AMC can come now.")
             return
         target = self.folder / "clips" / f"{Path(file).stem}.bvh"

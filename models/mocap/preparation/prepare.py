@@ -104,7 +104,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     Parameters
     ----------
     path : Path
-        BVH, AMC or DeepMimic.
+        File in one of the readable `formats`.
     loop : str
         ``auto``, ``open``, or ``START:END`` of the cycle, in seconds from the first frame that is kept.
     mirror : bool

@@ -26,6 +26,7 @@ from models.mocap.readers.motion_file import (
 )
 from models.mocap.readers.source_motion import SourceMotion
 
+SKELETON_SUFFIX = ".asf"
 FPS = 120.0  # [1/s], CMU's: AMC files do not state theirs
 _INCH = 0.0254  # [m]
 _FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -103,11 +104,11 @@ def _euler(order: str, values: dict[str, Array], degrees: bool, n: int) -> Array
 def _skeleton_path(path: Path) -> Path:
     if not path.exists():
         raise MotionFileError(path, 0, "cannot be opened (No such file or directory)", "a readable motion file")
-    names = (path.with_suffix(".asf"), path.with_name(path.stem.partition("_")[0] + ".asf"))
+    names = (path.with_suffix(SKELETON_SUFFIX), path.with_name(path.stem.partition("_")[0] + SKELETON_SUFFIX))
     for candidate in names:
         if candidate.is_file():
             return candidate
-    others = sorted(path.parent.glob("*.asf"))
+    others = sorted(path.parent.glob(f"*{SKELETON_SUFFIX}"))
     if len(others) == 1:
         return others[0]
     expected = " or ".join(dict.fromkeys(name.name for name in names))

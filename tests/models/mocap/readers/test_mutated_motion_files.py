@@ -8,7 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from models.errors import ModelError
-from models.mocap.library import load, read_motion
+from models.mocap.library import load
+from models.mocap.readers.formats import READABLE_SUFFIXES, read_motion
 from models.mocap.readers.motion_file import MotionFileError
 from tests.models.mocap.readers.motion_files import AMC, ASF, BVH, CHARACTER, DEEPMIMIC
 
@@ -70,7 +71,7 @@ def test_mutated_deepmimic_files_load_or_are_refused(tmp_path, content, characte
     assert_loads_or_is_refused(tmp_path / "m_walk.txt")
 
 
-@given(content=st.binary(max_size=200), suffix=st.sampled_from((".bvh", ".amc", ".txt", ".json", "")))
+@given(content=st.binary(max_size=200), suffix=st.sampled_from((*READABLE_SUFFIXES, "")))
 @FUZZ
 def test_random_bytes_are_refused(tmp_path, content, suffix):
     (tmp_path / "m.asf").write_text(ASF)

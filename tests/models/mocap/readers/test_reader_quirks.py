@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.mocap.library import load, read_motion
+from models.mocap.library import load
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic
+from models.mocap.readers.formats import read_motion
 from tests.models.mocap.readers.motion_files import BVH
 
 CHAIN = """HIERARCHY

@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
-from models.mocap.library import read_motion
 from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic
+from models.mocap.readers.formats import read_motion
 
 LONG_FILES = (
     "animated_drawings/jumping.bvh", "animated_drawings/wave_hello.bvh", "cmu_amc/01_01.bvh", "cmu_bvh/131_03.bvh",

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from models.mocap.library import load, read_motion
+from models.mocap.library import load
 from models.mocap.motion.clip import Clip
+from models.mocap.readers.formats import read_motion
 from models.mocap.retargeting.retarget import _world_axes, retarget
 from models.mocap.retargeting.retarget_report import floor_remarks, two_digits
 from models.mocap.retargeting.skeleton_roles import roles_of

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from models.mocap.library import embedded, load, read_motion
+from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip
+from models.mocap.readers.formats import read_motion
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.bodies import people_hips
 from models.mocap.retargeting.hints import Hints

@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import BODIES
-from models.mocap.library import embedded, embedded_names, load, read_motion
+from models.mocap.library import embedded, embedded_names, load
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.prepare import prepared
+from models.mocap.readers.formats import read_motion
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.body_lines import body_lines
 from models.mocap.retargeting.broken_frames import repair_frames

@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.library import load, read_motion
+from models.mocap.library import load
 from models.mocap.motion.clip import pose_difference
+from models.mocap.readers.formats import read_motion
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import joints_below, roles_of

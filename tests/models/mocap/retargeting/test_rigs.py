@@ -22,6 +22,7 @@ from models.mocap.library import embedded, embedded_names, load
 from models.mocap.motion import kinematics
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations, sole_points
+from models.mocap.readers.formats import READABLE_SUFFIXES
 from models.mocap.retargeting import abdomen, calibration, retarget
 from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
@@ -39,9 +40,8 @@ class Motions:
     """Source motions at 24 to 60 frames per second, whole or parts of 1 s: embedded clips, and captures if present."""
 
     def __init__(self):
-        suffixes = (".bvh", ".amc", ".txt")
         files = [path for folder in ("animated_drawings", "cmu_amc", "cmu_bvh", "deepmimic", "snu", "xia")
-                 for path in sorted((MOCAP / folder).glob("*")) if path.suffix in suffixes]  # fmt: skip
+                 for path in sorted((MOCAP / folder).glob("*")) if path.suffix in READABLE_SUFFIXES]  # fmt: skip
         skipped = ("humanoid3d_character.txt", "xia_rest_1frame.bvh")
         self.files = {path.name: path for path in files if path.name not in skipped}
         self._clips = {}
