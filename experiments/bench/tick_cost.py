@@ -4,6 +4,7 @@ The bare steps are those of the same run: its recorded controls are replayed thr
 then only `mj_step` takes time. So contacts and constraints are the same at every tick.
 """
 
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, get_args
@@ -21,6 +22,7 @@ from sim.world.world import FigureKind
 
 PHYSICS_STEP = 1e-3  # [s] physics step: one per servo tick, the fewest possible
 RUN_SECONDS, ROUNDS = 1.0, 5  # [s] of a run, and number of runs
+_THREAD_ROUNDS = 7  # runs on one and on two threads, of which the fastest count
 SLICE_TICKS = 50  # ticks that are run before they are replayed, so that both see the same load of the machine
 
 MODES: Mapping[str, Callable[[], RunConfig]] = {
@@ -70,7 +72,7 @@ def tick_cost(config: RunConfig) -> TickCost:
     return TickCost(tick, replayed / substeps, states_agree)
 
 
-def prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
+def _prepared(make: Callable[[], Session]) -> tuple[Session, TickLog, FrameLog, int]:
     """A session that has not been run, logs for `RUN_SECONDS` of it, and the number of ticks."""
     session = make()
     n = round(RUN_SECONDS / session.servo.plant.period)
@@ -82,6 +84,28 @@ def timed(session: Session, first: int, n: int, replay: bool, ticks: TickLog, fr
     begin = time.thread_time()
     run_block(session.servo, first, n, replay, ticks, frames)
     return time.thread_time() - begin
+
+
+def thread_scaling(make: Callable[[], Session]) -> float:
+    """Throughput of two threads with a session each, over twice that of one; the shortest times of all rounds count."""
+    alone_times, pair_times = list[float](), list[float]()
+    for _ in range(_THREAD_ROUNDS):
+        alone, pair = _prepared(make), [_prepared(make) for _ in range(2)]
+        threads = [
+            threading.Thread(target=run_block, args=(session.servo, 0, n, False, ticks, frames))
+            for session, ticks, frames, n in pair
+        ]
+        begin = time.perf_counter()
+        session, ticks, frames, n = alone
+        run_block(session.servo, 0, n, False, ticks, frames)
+        alone_times.append(time.perf_counter() - begin)
+        begin = time.perf_counter()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        pair_times.append(time.perf_counter() - begin)
+    return min(alone_times) / min(pair_times)
 
 
 _BLOCK_TICKS, _BLOCK_COUNT = 1000, 6  # ticks of a block, and blocks that are timed
