@@ -81,6 +81,49 @@ class Remainder(NamedTuple):
     force: float
 
 
+class _MassTerms(NamedTuple):
+    """Terms that are not convex in the mass μ: largest over a dense grid of masses and the corners of the hands.
+
+    Attributes
+    ----------
+    motion : float
+        |ν| on √V = 1, in the metric of the device's own part of μ [√kg m/s].
+    drift : float
+        Relative change of V per relative change of that part [1].
+    push : float
+        Acceleration by a force, in the same metric [1/√kg].
+    shift : float
+        Change of the sampled velocity by encoder quantisation [m/s].
+    place_shift, velocity_shift : float
+        √V of that change: as a velocity of e [1/s], and as a step of ν [1].
+    """
+
+    motion: float
+    drift: float
+    push: float
+    shift: float
+    place_shift: float
+    velocity_shift: float
+
+
+def _mass_terms(axis: Axis, form: Form, cell: Cell, rounding: float) -> _MassTerms:
+    z = cell.corners(N_MASSES)
+    dense = np.array([form.numbers(row) for row in z])
+    back = np.linalg.inv(dense)
+    lever = cell.lever(z[:, 0])
+    eigen = np.linalg.eigh(form.beta)
+    size = (eigen[1] * np.abs(eigen[0])) @ eigen[1].T
+    roots = np.linalg.cholesky(back)
+    drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * lever**2
+    blocks = np.sqrt(np.einsum("nii->ni", dense)) / axis.scale
+    shift = axis.damping / z[:, 0] * rounding
+    return _MassTerms(
+        motion=float((lever * np.sqrt(back[:, 1, 1])).max()) * axis.scale[1], drift=float(drifts.max()),
+        push=float((lever / z[:, 0]).max()), shift=float(shift.max()),
+        place_shift=float((blocks[:, 0] * shift).max()), velocity_shift=float((blocks[:, 1] * shift).max()),
+    )  # fmt: skip
+
+
 def remainder(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, level: float
 ) -> Remainder:
@@ -121,18 +164,8 @@ def remainder(
         return Remainder(np.inf, np.inf, np.inf, np.inf, np.inf, e, v, force)
     bend = course.curvature / (1.0 - curved_distance)
 
-    # Terms that are not convex in μ, on a dense grid of masses with the corners of the other parameters.
-    z = cell.corners(N_MASSES)
-    dense = np.array([form.numbers(row) for row in z])
-    back = np.linalg.inv(dense)
-    lever = cell.lever(z[:, 0])
-    motion = float((lever * np.sqrt(back[:, 1, 1])).max()) * scale[1] * overshoot * level
-    eigen = np.linalg.eigh(form.beta)
-    size = (eigen[1] * np.abs(eigen[0])) @ eigen[1].T
-    roots = np.linalg.cholesky(back)
-    drifts = np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ size @ roots)[:, -1] * lever**2
-    blocks = np.sqrt(np.einsum("nii->ni", dense)) / scale
-    shift = b / z[:, 0] * tube.rounding
+    masses = _mass_terms(axis, form, cell, tube.rounding)
+    motion = masses.motion * overshoot * level
     delay_travel = (1 + axis.delay) * t * speed
 
     newtons = (
@@ -141,18 +174,18 @@ def remainder(
         + (1.0 - share) * b * course.pace
         + b * course.shear * e * level
         + tube.coulomb
-        + (b + viscous) * float(shift.max()) + (k + tube.mass_slope * speed * b) * tube.rounding
+        + (b + viscous) * masses.shift + (k + tube.mass_slope * speed * b) * tube.rounding
         + axis.slides * 0.5 * t * spring * v * overshoot * level
     )  # fmt: skip
     metric = (
         tube.drag * (motion + np.sqrt(tube.mass_high) * pace)
         + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
-        + tube.mass_slope * t * speed * float((lever / z[:, 0]).max()) * total * level
+        + tube.mass_slope * t * speed * masses.push * total * level
     )
     slowest = float(scale[2] / np.sqrt(forms[:, 2, 2].max()))  # 1/√p_yy for the largest p_yy of the forms [m/s]
-    rate = 0.5 * tube.mass_slope * float(drifts.max()) * speed
+    rate = 0.5 * tube.mass_slope * masses.drift * speed
     rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * overshoot) / slowest * speed
-    drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * float((blocks[:, 0] * shift).max())
+    drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * masses.place_shift
     if axis.slides:
         turn, cross = _velocity_level(forms, scale), _slide_level(form, forms, inverses, tube, e, scale)
         second_bend = 0.5 * bend * bend / max(course.curvature, 1e-9)
@@ -164,7 +197,7 @@ def remainder(
     return Remainder(
         rate=SECOND_ORDER_FACTOR * rate, drift=SECOND_ORDER_FACTOR * drift,
         newtons=SECOND_ORDER_FACTOR * newtons, metric=SECOND_ORDER_FACTOR * metric,
-        shift=float((blocks[:, 1] * shift).max()), distance=e, speed=v, force=force,
+        shift=masses.velocity_shift, distance=e, speed=v, force=force,
     )  # fmt: skip
 
 
