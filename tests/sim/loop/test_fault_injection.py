@@ -1,103 +1,19 @@
-"""Faults injected into readings and memories: the force is zero until the servo is rearmed.
-
-The device behind two arrays is driven by a second simulated Phantom (`tests.sim.bare_servos.SimulatedDriver`), so that
-faults are injected between the two, as they would occur with hardware.
-"""
+"""Faults injected into readings and memories: the force is zero until the servo is rearmed."""
 
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 import pytest
 
-from controllers.safety.command import command_force
-from controllers.safety.energy_tank import TANK_ENERGY, EnergyTank
-from controllers.safety.faults import FAULT_GAPS, FAULT_LAST_GAP, Fault, Plausibility, latched
-from controllers.safety.limiter import ForceLimiter
-from models.humanoid.skeleton import rest_pose
-from models.phantom.parameters import PREMIUM_1_5
-from models.world.scene import PHANTOM
+from controllers.safety.energy_tank import TANK_ENERGY
+from controllers.safety.faults import FAULT_GAPS, FAULT_LAST_GAP, Fault, latched
 from sim.devices.device import read_device
-from sim.devices.exchange import READING_CLOCK, READING_THETA, exchange
+from sim.devices.exchange import READING_CLOCK, READING_THETA
 from sim.loop.channels import make_logs
-from sim.loop.servo import rearm_servo, run_block
-from sim.users.hand.actions import Grab
-from sim.users.hand.arm import Arm
-from sim.world.encoders import SILENT_PERIODS, TOP_RATES
-from sim.world.world import World
-from tests.sim.bare_servos import (
-    CUTOFF,
-    START,
-    SimulatedDriver,
-    bare_servo,
-    device_world,
-    follow_program,
-    pass_period,
-    simulated,
-)
-
-SILENCE = SILENT_PERIODS * 1e-3
-FORCE_PRESENT = 0.02  # [N], a force above this counts as present
-
-
-class ExchangeLoop:
-    """A servo, the device behind two arrays, and its driver, run tick by tick; records commands and faults."""
-
-    def __init__(
-        self,
-        arm: Arm | None = None,
-        damping: float = 4.0,
-        tank: EnergyTank | None = None,
-        silent: float = SILENT_PERIODS,
-    ):
-        self.world = device_world()
-        self.program = follow_program(damping=damping)
-        self.device = exchange(self.world, CUTOFF, silent=silent)
-        self.servo = bare_servo(self.world, self.device, self.program, tank=tank)
-        self.driver = SimulatedDriver(self.device, arm)
-        self.tick = 0
-        self.force, self.torque, self.fault, self.applied = [], [], [], []
-
-    def run(self, n: int, tamper: Callable[[], None] = lambda: None) -> None:
-        """Run some ticks; `tamper` is called between the driver's reading and the servo."""
-        for _ in range(n):
-            if self.tick > 0:
-                self.driver.write()
-                self.applied.append(self.driver.torque.copy())
-            self.driver.read()
-            tamper()
-            ticks, frames = make_logs(self.servo, 1)
-            run_block(self.servo, self.tick, 1, False, ticks, frames)
-            self.force.append(ticks.force[0])
-            self.torque.append(ticks.torque[0])
-            self.fault.append(ticks.fault[0, 0])
-            self.tick += 1
-
-    @property
-    def sizes(self) -> np.ndarray:
-        return np.linalg.norm(self.force, axis=1)
-
-
-def assert_motors_off(loop: ExchangeLoop, since: int) -> None:
-    """From a tick on a fault is latched, and force, commanded torque and motor torque are zero."""
-    assert all(loop.fault[since:])
-    assert not np.any(loop.force[since:])
-    assert not np.any(loop.torque[since:])
-    assert not np.any(loop.applied[since:])
-
-
-def assert_recovers_after_rearm(loop: ExchangeLoop) -> None:
-    """The force returns once the servo is rearmed, without a jump."""
-    first = len(loop.force)
-    rearm_servo(loop.servo)
-    loop.run(150)
-    assert not any(loop.fault[first:])
-    assert loop.sizes[first] < 0.05
-    assert loop.sizes[-1] > FORCE_PRESENT
-    assert np.abs(np.diff(loop.sizes[first:])).max() < 0.3
-
-
-# Single faults
+from sim.loop.servo import run_block
+from sim.world.encoders import SILENT_PERIODS
+from tests.sim.bare_servos import bare_servo, device_world, pass_period, simulated
+from tests.sim.loop.exchange_loop import FORCE_PRESENT, ExchangeLoop, assert_motors_off, assert_recovers_after_rearm
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -284,82 +200,6 @@ def test_tank_memory_that_is_not_finite_is_a_fault(place: int) -> None:
     assert latched(loop.device.faults).fault is Fault.TANK_NOT_FINITE
     assert loop.servo.field.tank[TANK_ENERGY] != 0.0
     assert_recovers_after_rearm(loop)
-
-
-def test_force_cut_by_the_tank_obeys_the_slew_limit_and_its_work_is_booked() -> None:
-    """8 N, cut by a tank without energy, fall by the slew per tick, and the work of these ticks is booked."""
-    limiter, tank = ForceLimiter(1e-3), EnergyTank(1e-3, power=1e-9, capacity=1.0)
-    memory, store, faults = limiter.fresh_memory(), tank.fresh_memory(), plausibility().fresh()
-    hand, wrench, force, forces = np.zeros(15), np.array([8.0, 0, 0, 0, 0, 0]), np.zeros(3), []
-    for k in range(40):
-        hand[0], hand[1], hand[8] = 1e-3 * k, 0.5e-3 * k, 0.5
-        if k == 20:
-            store[TANK_ENERGY] = 0.0
-        command_force(limiter.limits(), memory, tank.params(), store, faults, hand, wrench, force)
-        forces.append(force.copy())
-        if k == 21:
-            np.testing.assert_allclose(store[TANK_ENERGY], -(forces[19][0] + forces[20][0]) * 0.5e-3, rtol=1e-6)
-    forces = np.array(forces)
-    assert forces[19][0] == pytest.approx(8.0)
-    assert forces[22][0] == pytest.approx(0.0, abs=1e-3)
-    steps = np.linalg.norm(np.diff(forces, axis=0, prepend=np.zeros((1, 3))), axis=1)
-    assert steps.max() == pytest.approx(5.0)
-
-
-def plausibility() -> Plausibility:
-    return Plausibility(1e-3, TOP_RATES, PREMIUM_1_5.encoder_step, SILENCE)
-
-
-# No false alarms
-
-
-def test_motionless_hand_is_no_fault() -> None:
-    """At rest without force, firmly against a small force, and, with the switch pressed, against a large one."""
-    path = np.tile(START, (2, 1))
-    cases = (
-        (Arm(), follow_program(0.0, 0.0)),
-        (Arm(1000.0, 10.0, path, 10.0), follow_program(1.0, 0.0)),
-        (Arm(1000.0, 10.0, grabs=(Grab(0.0, (0.0, 0.0, 0.0), seconds=0.1, hold=3.0),)), follow_program(60.0, 0.0)),
-    )
-    motionless = []
-    for arm, program in cases:
-        world = device_world()
-        servo = bare_servo(world, simulated(world, arm), program)
-        ticks, frames = make_logs(servo, 3000)
-        run_block(servo, 0, 3000, False, ticks, frames)
-        assert not ticks.fault.any()
-        motionless.append(np.all(np.diff(ticks.hand[-600:, 1:4], axis=0) == 0.0))
-    assert all(motionless)  # so that frozen encoders could have been suspected
-
-
-def test_trembling_firm_hand_under_force_is_no_fault() -> None:
-    t = np.arange(3000) * 1e-3
-    tremor = 0.05e-3 * np.sin(2.0 * np.pi * 9.0 * t)[:, None] * np.array([0.6, 0.64, 0.48])
-    loop = ExchangeLoop(Arm(1000.0, 10.0, START + tremor, 1e-3))
-    loop.run(2500)
-    assert loop.sizes[-1] > 1.0
-    assert not any(loop.fault)
-
-
-def test_linkage_at_peak_torque_stays_below_the_impossible_rate() -> None:
-    """Every motor at its peak torque from stop to stop, with friction, stays below the impossible rate."""
-    world = World(kind="none")
-    model, fastest = world.model, np.zeros(3)
-    dofs = [int(model.joint(PHANTOM + name).dofadr[0]) for name in ("theta1", "theta2", "theta3")]
-    for motor in range(3):
-        for sign in (-1.0, 1.0):
-            world.reset(START, rest_pose())
-            peak = sign * np.array(PREMIUM_1_5.peak_torque) * (np.arange(3) == motor)
-            for positions in (-peak, peak):
-                world.data.ctrl[:3] = positions
-                for _ in range(4000):
-                    mujoco.mj_step(model, world.data)
-                    fastest = np.maximum(fastest, np.abs(world.data.qvel[dofs]))
-    assert np.all(fastest < TOP_RATES)
-    assert np.all(fastest > 0.15 * np.array(TOP_RATES))
-
-
-# Random faults
 
 
 def random_fault(rng: np.random.Generator, loop: ExchangeLoop) -> tuple[str, Callable[[], None], int]:
