@@ -23,6 +23,7 @@ PIECE = 4 * CHANNELS  # numbers per piece: rows 1, u, u², u³ with u = t − br
 _nodes, _weights = np.polynomial.legendre.leggauss(6)
 _GAUSS_NODES: Array = 0.5 * (_nodes + 1.0)
 _GAUSS_WEIGHTS: Array = 0.5 * _weights
+_CIRCLE_PIECES = 96  # of a circle, which keep the spline within 1e-6 of the radius
 
 
 @njit
@@ -209,7 +210,7 @@ class Trajectory:
 
     @staticmethod
     def circle(
-        radius: float, period: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0), samples: int = 96, wave: float = 0.0
+        radius: float, period: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0), wave: float = 0.0
     ) -> "Trajectory":
         """Circle about an axis parallel to z of H, counter-clockwise from +x, once in `period` seconds.
 
@@ -223,8 +224,6 @@ class Trajectory:
             [s].
         centre : array_like, shape (3,)
             In H [m].
-        samples : int
-            Samples per lap; 96 keep the spline within 1e-6 of the radius.
         wave : float
             a [m].
 
@@ -235,12 +234,11 @@ class Trajectory:
         """
         checked("radius", radius, "m")
         checked("period", period, "s")
-        check_kind("samples", samples, int)
         check_kind("wave", wave, float)
         middle = numbers_of("centre", centre)
         if middle.shape != (3,):
             raise CurveError(f"the centre of a circle is {middle.tolist()}; expected three numbers")
-        angle = np.linspace(0.0, 2.0 * np.pi, samples + 1)
+        angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE_PIECES + 1)
         ring = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
         ring[:, 2] = wave * np.sin(3.0 * angle)
         ring[-1] = ring[0]

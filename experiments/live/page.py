@@ -23,14 +23,14 @@ from experiments.live.panels.run_panel import RunPanel, UploadsPanel
 from experiments.live.panels.status import FIRST_STEPS, status_html
 from experiments.live.panels.takes_panel import TakesPanel
 from experiments.live.session.desk import Desk
-from experiments.live.session.messages import COURSE_POINTS, SLICE_SIDE
+from experiments.live.session.messages import SLICE_SIDE
 from geometry.arrays import Array
 from geometry.errors import HvfError
 from models.world.scene import SceneConfig
 from sim.devices.driver import DriverFault
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
-from sim.viewer.shown import Moment, courses
+from sim.viewer.shown import COURSE_POINTS, Moment, courses
 from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 

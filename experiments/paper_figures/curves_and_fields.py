@@ -20,6 +20,7 @@ from geometry.quaternions import heading
 from models.humanoid.skeleton import DEFAULT_STATURE
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, TUBE, USER
+from sim.viewer.shown import COURSE_POINTS
 
 ARROW_SECONDS = 0.25  # duration of motion that an arrow of Figure 1 represents [s]
 MAX_ARROW_LENGTH = 22.0  # longest arrow of Figure 4 [mm]
@@ -36,7 +37,7 @@ def trajectory_and_vectors(runs: Path) -> Figure:
         start, end = pushed_lap(recording)
         _, p, force = ticks(recording, start, end, "p", "force")
     figure = Figure(figsize=(6.2, 4.4), layout="constrained")
-    phases = np.linspace(curve.start, curve.end, 241)
+    phases = np.linspace(curve.start, curve.end, COURSE_POINTS)
     ring, hand = MILLIMETRES * curve.point(phases), MILLIMETRES * p
     ax = workspace(figure, 111, np.concatenate((ring, hand)), 48.0)
     path(ax, ring, CURVE, "trajectory φ", 1.8)
@@ -57,7 +58,7 @@ def field_and_map(runs: Path) -> Figure:
         start, end = pushed_lap(recording)
         _, p, force = ticks(recording, start, end, "p", "force")
         t, lap = ticks(recording, 0.0, curve.duration * 1.05, "p")
-        ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
+        ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
         middle = ring.mean(axis=0)[:2]
         angles = np.unwrap(np.arctan2(*(MILLIMETRES * lap[:, :2] - middle).T[::-1]))
         target_angles = angles[0] + np.sign(angles[-1] - angles[0]) * 2.0 * np.pi * np.arange(N_POSES) / N_POSES
@@ -106,7 +107,7 @@ def v_plus_u(runs: Path) -> Figure:
     course = integrate(Edited(river, (performed,), (1.0,)).flow, performed.point(0.0), times).points
     rms_error = MILLIMETRES * np.sqrt(np.mean(np.sum((course - performed.point(times)) ** 2, axis=1)))
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
-    ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, 241))
+    ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     hand, line = MILLIMETRES * p, MILLIMETRES * course
     for ax in (left, right):

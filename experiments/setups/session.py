@@ -27,6 +27,7 @@ from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
 from sim.reference.reference import make_reference, map_poses, reference_along
 from sim.users.participant import Participant
+from sim.viewer.shown import COURSE_POINTS
 from sim.world.world import World
 
 
@@ -97,7 +98,7 @@ class Session:
 
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """Constant data that the recording keeps beside the channels."""
-        phases, notes = np.linspace(self.curve.start, self.curve.end, 241), self.parts.notes
+        phases, notes = np.linspace(self.curve.start, self.curve.end, COURSE_POINTS), self.parts.notes
         scene = self.world.config
         return {
             "curve": self.curve.point(phases),

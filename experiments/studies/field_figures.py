@@ -119,10 +119,15 @@ def crossing_figure() -> Figure:
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     crossing_ax, passing_ax = figure.subplots(1, 2, sharey=True)
     crossing_ax.plot(angles, [row.alone for row in rows], color=USER, ls="--", label="discrete, river 2 alone")
-    columns = (("static sum", TUBE), ("smooth", FIELD), ("discrete", CURVE))
-    for (name, colour), here, passing in zip(columns, (1, 2, 3), (5, 6, 7), strict=True):
-        crossing_ax.plot(angles, [row[here] for row in rows], color=colour, label=name)
-        passing_ax.plot(angles, [row[passing] for row in rows], color=colour)
+    columns = (
+        ("static sum", TUBE, [(row.both, row.both_passing) for row in rows]),
+        ("smooth", FIELD, [(row.smooth, row.smooth_passing) for row in rows]),
+        ("discrete", CURVE, [(row.discrete, row.discrete_passing) for row in rows]),
+    )
+    for name, colour, forces in columns:
+        here, passing = zip(*forces, strict=True)
+        crossing_ax.plot(angles, here, color=colour, label=name)
+        passing_ax.plot(angles, passing, color=colour)
     for ax, title in ((crossing_ax, "at the crossing"), (passing_ax, "largest while passing")):
         ax.set(xlabel="angle between the rivers [°]", xticks=range(0, 181, 30), title=title)
     crossing_ax.set(ylabel="force of river 2 [N]")

@@ -10,6 +10,8 @@ import numpy.typing as npt
 from geometry.arrays import Array
 from sim.viewer.palette import CURVE, TUBE, river_colors
 
+COURSE_POINTS = 241  # points at which a curve is drawn
+
 
 class Course(NamedTuple):
     """A curve as it is drawn: name of the river or empty, points (m, 3) in H [m], colours ``#rrggbb``."""

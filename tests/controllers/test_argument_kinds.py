@@ -32,7 +32,7 @@ CONSTRUCTORS: list[tuple[Any, dict[str, Any]]] = [
     (HigherOrder, {"bundle": BUNDLE, "admission": 0.1, "sigma": 0.1, "form": "smooth"}),
     (StretchyTubes, {"curve": CIRCLE, "k_f": 100, "k_s": 100, "until": 3, "then": FOLLOW, "depth": 4, "hold": "curve"}),
     (EnergyTank, {"period": 1e-3, "power": 1, "capacity": 1, "drain_time": 0.05}),
-    (Trajectory.circle, {"radius": 0.05, "period": 4, "samples": 96, "wave": 0.0}),
+    (Trajectory.circle, {"radius": 0.05, "period": 4, "wave": 0.0}),
     (Weight.speed, {"low": 0.1, "high": 1}),
     (Weight.constant, {"s": 1}),
     (FOLLOW.limited, {"force": 3, "torque": 1}),

@@ -26,6 +26,7 @@ from sim.hardware.process_start import parent_id
 from sim.loop.channels import configuration_size, shown_configuration
 from sim.loop.field_slice import field_slice
 from sim.recording.recorder import DiskFull
+from sim.viewer.shown import COURSE_POINTS
 
 # [s] shortest time between two pictures: every other block of 8 ms, so that each page frame is new
 MIN_FRAME_INTERVAL = 0.012
@@ -255,9 +256,9 @@ def slice_points(height: float) -> Array:
 
 
 def _curve_points(engine: Engine) -> Array:
-    """Points of the curve as currently bent, in H [m], shape (241, 3)."""
+    """Points of the curve as currently bent, in H [m], shape (COURSE_POINTS, 3)."""
     curve = engine.session.curve if engine.tubes is None else engine.tubes.edited(engine.memory)
-    return curve.point(np.linspace(curve.start, curve.end, messages.COURSE_POINTS))
+    return curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))
 
 
 def _built_message(session: Session, engine: Engine) -> messages.Built:

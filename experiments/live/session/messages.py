@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from experiments.config.run_config import RunConfig
 from geometry.arrays import Array
+from sim.viewer.shown import COURSE_POINTS
 
-COURSE_POINTS = 241  # points at which the bent curve is drawn
 SLICE_SIDE = 9  # points along each side of the field's slice
 
 SHOWN = {

@@ -19,6 +19,7 @@ from experiments.setups.parts.governor import governed, speeds_along
 from experiments.setups.parts.hands import MIN_PUSHED_RIVER_SPEED
 from experiments.setups.parts.pace import course_of, paced
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts, RiverChoice, Static
+from sim.viewer.shown import COURSE_POINTS
 
 # In units of the default curve's speed. A hand at rest is admitted, since its velocity differs by 1 from the current's;
 # a hand that crosses at a right angle is not: the difference is √2. Without hysteresis rivers chatter after 4 ms.
@@ -120,7 +121,7 @@ def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice
 
 def drawn(bundle: RiverBundle) -> Static:
     """Names and curves of rivers, for figures and replays."""
-    share = np.linspace(0.0, 1.0, 241)
+    share = np.linspace(0.0, 1.0, COURSE_POINTS)
     curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
     return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
 
