@@ -16,33 +16,7 @@ from controllers.fields.algebra.walker_feed import WalkerFeed
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from controllers.walking.walking import FOLLOWED, Walking, followed_at
 from geometry.arrays import Array
-
-
-@njit
-def leading_force(  # noqa: PLR0913 - a formula of numbers, also on CasADi symbols
-    p_x: float, p_y: float, v_x: float, v_y: float, x: float, y: float, c: float, s: float, along: float,
-    back: float, lead: float, room: float, scale: float, k_l: float, b: float,
-) -> tuple[float, float]:  # fmt: skip
-    r"""F = −k_l (u_t t + u_n n)/S − b v in the plane, in H.
-
-    Parameters
-    ----------
-    p_x, p_y, v_x, v_y : float
-        Stylus [m], [m/s].
-    x, y, c, s : float
-        Point of the path nearest to the stylus, on the floor [m], and the tangent t = (c, s) there; n = (−s, c).
-    along : float
-        Arc length of that point minus s + D, its desired value [m].
-    back, lead, room : float
-        Offsets that the figure can follow backwards, forwards and to each side [m]; u_t and u_n are the excess.
-    scale, k_l, b : float
-        S, k_l [N/m], b [N s/m].
-    """
-    d_x, d_y = scale * p_x - x, scale * p_y - y
-    d_t, d_n = along + c * d_x + s * d_y, c * d_y - s * d_x
-    u_t = (d_t - np.minimum(np.maximum(d_t, -back), lead)) / scale
-    u_n = (d_n - np.minimum(np.maximum(d_n, -room), room)) / scale
-    return -k_l * (u_t * c - u_n * s) - b * v_x, -k_l * (u_t * s + u_n * c) - b * v_y
+from geometry.vectors import Vector, vector_at
 
 
 class LeadingGains(NamedTuple):
@@ -59,24 +33,56 @@ class LeadingGains(NamedTuple):
     lead_back: float
 
 
+class PathPoint(NamedTuple):
+    """The point of the walked path nearest to the stylus.
+
+    Attributes
+    ----------
+    x, y : float
+        Its place on the floor [m].
+    c, s : float
+        Tangent t = (c, s) of the path there; n = (−s, c).
+    along : float
+        Arc length of that point minus s + D, its desired value [m].
+    room : float
+        Offset to each side that the path can reach there [m].
+    """
+
+    x: float
+    y: float
+    c: float
+    s: float
+    along: float
+    room: float
+
+
+@njit
+def leading_force(p: Vector, v: Vector, path: PathPoint, gains: LeadingGains) -> Vector:
+    """F of `Leading` in H [N] for a stylus at p [m] with velocity v [m/s]; also on CasADi symbols."""
+    x, y, c, s, along, room = path
+    k_l, b, k_z, scale, lead, lead_back = gains
+    d_x, d_y = scale * p[0] - x, scale * p[1] - y
+    d_t, d_n = along + c * d_x + s * d_y, c * d_y - s * d_x
+    u_t = (d_t - np.minimum(np.maximum(d_t, -lead_back), lead)) / scale
+    u_n = (d_n - np.minimum(np.maximum(d_n, -room), room)) / scale
+    return -k_l * (u_t * c - u_n * s) - b * v[0], -k_l * (u_t * s + u_n * c) - b * v[1], -k_z * p[2] - b * v[2]
+
+
 @njit
 def leading_wrench(params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array) -> None:
-    """Kernel of `Leading`: parameters `LeadingGains`, memory a `Followed`."""
-    p, v = hand[HAND_POSITION : HAND_POSITION + 3], hand[HAND_VELOCITY : HAND_VELOCITY + 3]
+    """Kernel of `Leading`: parameters `LeadingGains`, memory a `WalkerState`."""
+    p, v = vector_at(hand, HAND_POSITION), vector_at(hand, HAND_VELOCITY)
     wrench[:] = 0.0
     if not np.isfinite(p[0] + p[1] + p[2] + hand[HAND_TIME]):
         # A value that is not finite must reach the limiter.
         wrench[:3] = np.nan
         return
     gains = LeadingGains(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
-    walker, scale = followed_at(memory, slot), gains.scale
+    walker = followed_at(memory, slot)
     c, s = np.cos(walker.heading), np.sin(walker.heading)
-    wrench[0], wrench[1] = leading_force(
-        p[0], p[1], v[0], v[1], walker.x, walker.y, c, s, walker.along, gains.lead_back, gains.lead, walker.room,
-        scale, gains.k_l, gains.b,
-    )  # fmt: skip
-    wrench[2] = -gains.k_z * p[2] - gains.b * v[2]
-    q_x, q_y = (walker.x + walker.beyond * c) / scale, (walker.y + walker.beyond * s) / scale
+    path = PathPoint(walker.x, walker.y, c, s, walker.along, walker.room)
+    wrench[0], wrench[1], wrench[2] = leading_force(p, v, path, gains)
+    q_x, q_y = (walker.x + walker.beyond * c) / gains.scale, (walker.y + walker.beyond * s) / gains.scale
     distance = np.sqrt((p[0] - q_x) ** 2 + (p[1] - q_y) ** 2 + p[2] ** 2)
     write_trace_point(memory, walker.s, (q_x, q_y, 0.0), distance, walker.goal)
 

@@ -19,7 +19,7 @@ from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.laws import Law
 from controllers.certificates.loop.sampled_loop import UNDELAYED_SIZE, SampledLoop
 from controllers.curves.trajectory import piece_point, piece_velocity
-from controllers.fields.leading import leading_force
+from controllers.fields.leading import LeadingGains, PathPoint, leading_force
 from controllers.walking.walker import walker_acceleration
 from geometry.arrays import Array
 
@@ -65,11 +65,10 @@ class Regime(NamedTuple):
             # On the path, the nearest point moves along with the stylus, and there is no room to the sides.
             along = 0.0 if self.beyond else advance
             room = self.turn * advance - _EDGE_OFFSET if self.aside else _INACTIVE_WIDTH
-            pull = leading_force.py_func(
-                p[0], p[1], v[0], v[1], scale * here[0] + c * along, scale * here[1] + s * along, c, s, along,
-                _INACTIVE_WIDTH, -_EDGE_OFFSET if self.ahead else _INACTIVE_WIDTH, room, scale, k_l, b,
-            )  # fmt: skip
-            return vector([*pull, -upright * k_l * p[2] - b * v[2]])
+            path = PathPoint(scale * here[0] + c * along, scale * here[1] + s * along, c, s, along, room)
+            lead = -_EDGE_OFFSET if self.ahead else _INACTIVE_WIDTH
+            gains = LeadingGains(k_l, b, upright * k_l, scale, lead, lead_back=_INACTIVE_WIDTH)
+            return vector([*leading_force.py_func(p, v, path, gains)])
 
         return Law(force, slides=not (self.ahead and self.aside), carries=False)
 

@@ -8,7 +8,7 @@ from numba import njit
 from controllers.errors import ParameterError
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import feed_walkers
-from controllers.fields.leading import Leading, leading_force
+from controllers.fields.leading import Leading, LeadingGains, PathPoint, leading_force
 from controllers.state import HandState
 from controllers.walking.gait import Gait
 from controllers.walking.walked_path import (
@@ -174,12 +174,15 @@ def test_wrench_equals_the_compiled_program():
 def test_compiled_law_matches_casadi():
     mode = casadi.GlobalOptions.getNumpyMode()
     casadi.GlobalOptions.setNumpyMode(1)
-    symbols = [casadi.SX.sym(f"x{i}") for i in range(15)]
-    law, rng = casadi.Function("law", symbols, list(leading_force.py_func(*symbols))), np.random.default_rng(5)
+    sizes = (3, 3, len(PathPoint._fields), len(LeadingGains._fields))
+    symbols = [casadi.SX.sym(f"x{i}", size) for i, size in enumerate(sizes)]
+    force = leading_force.py_func(*symbols[:2], *(casadi.vertsplit(symbol) for symbol in symbols[2:]))
+    law, rng = casadi.Function("law", symbols, list(force)), np.random.default_rng(5)
     casadi.GlobalOptions.setNumpyMode(mode)
     for _ in range(30):
-        numbers = rng.uniform(0.1, 1.0, 15)
-        np.testing.assert_allclose(leading_force(*numbers), np.ravel(law(*numbers)), rtol=1e-13)
+        p, v, path, gains = (rng.uniform(0.1, 1.0, size) for size in sizes)
+        found = leading_force(tuple(p), tuple(v), PathPoint(*path), LeadingGains(*gains))
+        np.testing.assert_allclose(found, np.ravel(law(p, v, path, gains)), rtol=1e-13)
 
 
 @pytest.mark.parametrize("gait", [_WALK, _RUN], ids=["walk", "run"])
