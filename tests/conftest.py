@@ -22,6 +22,7 @@ from hypothesis import settings
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
+from controllers.certificates.report import Verdict
 from sim.compilation import bound_call, unit_workers
 from sim.compilation.deferred_codegen import is_nested
 from sim.compilation.unit_cache import UnitCache, cache_folder
@@ -110,3 +111,9 @@ Dispatcher.compile = _compile_or_load
 def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs write neither figures nor a report page, which would take longer than the run itself."""
     monkeypatch.setattr("experiments.results.pages.report.write_report_of", lambda folder: None)
+
+
+@pytest.fixture
+def without_region(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Certificates have no region of attraction, whose search takes most of their time."""
+    monkeypatch.setattr("experiments.certify.certify.region", lambda *given: Verdict("unknown", "not searched"))

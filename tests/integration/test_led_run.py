@@ -21,7 +21,9 @@ MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("led") / "run"
-    run(run_config(mode="lead", seconds=19.0), folder, False, 0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("experiments.results.pages.report.write_report_of", lambda folder: None)
+        run(run_config(mode="lead", seconds=19.0), folder, False, 0.0)
     return folder
 
 

@@ -56,6 +56,7 @@ def test_arm_tracks_the_map_with_torque_margin(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_region")
 def test_arm_run_is_reproduced_exactly(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     config = load_config(folder / "config.json")
     assert replace(config, user=run_config().user) == resolved(run_config(map="robot-arm", seconds=8.0))

@@ -67,6 +67,7 @@ def test_physical_figure_follows_without_warnings(folder: Path) -> None:
     assert summary["figure"]["root_error_max_cm"] < 5.0
 
 
+@pytest.mark.usefixtures("without_region")
 def test_run_is_certified_with_its_clips(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["certify", str(folder), "--no-hand", "--out", str(tmp_path)]
     assert main([*command, "--json"]) == 0

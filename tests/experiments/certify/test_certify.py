@@ -242,6 +242,7 @@ def test_clip_certificate_is_verified_with_its_stored_options(tmp_path, monkeypa
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_region")
 def test_field_certificate_is_verified_with_its_stored_gains(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["certify", "--stiffness", "500", "--no-hand", "--out", "field"]) == 0

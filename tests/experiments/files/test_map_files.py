@@ -157,6 +157,7 @@ def test_map_with_another_pose_size_is_refused(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_region")
 def test_map_file_is_certified_along_all_curves_with_its_clips(tmp_path, capsys):
     path = tmp_path / "map.npz"
     save_map(lifted(), path)

@@ -246,6 +246,7 @@ def test_cached_verdict_equals_the_computed_one_and_follows_the_gain() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_region")
 def test_tuning_result_is_a_certified_run_configuration(tmp_path: Path) -> None:
     config = tuning(candidates=2, space={"stiffness": {"low": 50.0, "high": 2000.0, "log": True}})
     found = run_tuning(replace(config, prune=False), tmp_path, where=Where(threads=2))

@@ -77,13 +77,6 @@ def test_acceleration_limit_keeps_fast_clips_where_the_device_can_follow():
     assert 0.7 * unlimited < limited <= 0.8 * unlimited
 
 
-@pytest.mark.slow
-def test_twelve_clips_keep_their_separation():
-    many = [motion(swinging(k, amplitude=0.2 + 0.05 * k), f"{k}") for k in range(12)]
-    found = lifted_at(many)
-    assert found.after.separation >= ROOM.separation
-
-
 def test_clips_of_any_length_and_rate_are_lifted():
     clips = [motion(swinging(1, frames=40), "short", 25.0), motion(swinging(2, frames=500), "long", 120.0)]
     found = lifted_at(clips)

@@ -1,6 +1,7 @@
 """Preparation of files: what it makes of a capture, what it refuses, what it reports."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -108,7 +109,14 @@ def long_walk(tmp_path):
     return path
 
 
+@pytest.fixture
+def one_step(monkeypatch):
+    """The search for a feasible motion ends after one step."""
+    monkeypatch.setattr("models.mocap.preparation.prepare.feasible", partial(feasible, iterations=1))
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_step")
 def test_part_of_a_long_file_can_be_prepared(long_walk):
     result = prepared(long_walk, "10:12.2")
     assert result.captured.duration > 120.0
@@ -123,6 +131,7 @@ def test_whole_file_longer_than_120_s_is_refused(long_walk):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("one_step")
 def test_prepare_command_prints_missing_joints_and_dropped_frames(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.preparation.command.followed", lambda clip, seconds: followed(clip, 1.0))
     walk = embedded("walk")
