@@ -61,6 +61,12 @@ def test_next_run_keeps_size_seed_and_rates_of_the_session(mode: str) -> None:
     assert run.clock.servo_period == 2e-3
 
 
+@pytest.mark.parametrize("files", [("mine.amc", "yours.bvh"), ("a/walk.bvh", "b/walk.bvh")])
+def test_next_run_plays_the_motion_files_that_the_session_was_started_with(files: tuple[str, str]) -> None:
+    clips = (files[0], "walk", files[1], "cheer")
+    assert chosen("bunny", "physical", clips=clips).map.clips == clips
+
+
 def test_kinematic_figure_keeps_the_stature_and_has_no_mass() -> None:
     run = chosen("follow", "kinematic", stature=1.6, mass=55.0)
     assert (run.figure.kind, run.figure.stature, run.figure.mass) == ("kinematic", 1.6, DEFAULT_MASS)

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import viser
@@ -54,7 +55,10 @@ class RunPanel:
             self._folder = gui.add_folder("Clips")
             self._build = gui.add_button("Run this", icon=viser.Icon.PLAYER_PLAY, color="blue")
         self._slots: list[viser.GuiDropdownHandle[Any]] = []
-        self._pending_names = tuple(config.map.clips)
+        for file in map(Path, config.map.clips):
+            if file.suffix and file not in desk.clips.values():  # embedded clips have names without
+                desk.clips[str(file) if file.stem in self._clips() else file.stem] = file
+        self._pending_names = self._labels(config)
         self._offered_clips = self._clips()
         self._rebuild_slots()
         self._mode.on_update(acts(lambda event: self._rebuild_slots()))
@@ -89,7 +93,7 @@ class RunPanel:
     def show(self, built: Built) -> None:
         """Set the choice to the current run."""
         config = built.config
-        self._pending_names = tuple(_clip_label(clip) for clip in config.map.clips)
+        self._pending_names = self._labels(config)
         self._mode.value, self._figure.value = config.mode.kind, config.figure.kind
         if not config.leads:
             self._map.value = _map_kind(config)
@@ -128,6 +132,11 @@ class RunPanel:
     def _shown_names(self) -> tuple[str, ...]:
         return tuple(str(slot.value) for slot in self._slots)
 
+    def _labels(self, config: RunConfig) -> tuple[str, ...]:
+        """The clips of a run as the lists name them."""
+        labels = {file: name for name, file in self._desk.clips.items()}
+        return tuple(labels.get(Path(clip), clip) for clip in config.map.clips)
+
     def _clip_names(self) -> tuple[str, ...]:
         return tuple(str(self._desk.clips.get(name, name)) for name in self._shown_names())
 
@@ -139,11 +148,6 @@ def _map_kind(config: RunConfig) -> str:
 def _default_clips(kind: str) -> tuple[str, ...]:
     cls = next((part for part in (*MAPS, Led) if part.__pydantic_fields__["kind"].default == kind), None)  # pyright: ignore
     return () if cls is None or kind == "file" else cls().clips  # pyright: ignore
-
-
-def _clip_label(clip: str) -> str:
-    """Name of a clip in a list; for a file, its stem."""
-    return clip if clip in embedded_names() else clip.rsplit("/", 1)[-1].removesuffix(".bvh")
 
 
 class UploadsPanel:
