@@ -1,6 +1,7 @@
 """The panel that chooses the next run: what the session was started with stays, whatever mode and map are chosen."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from experiments.config.options import run_config
 from experiments.config.run_config import Clock
 from experiments.live.panels.run_panel import RunPanel
+from experiments.live.session.desk import Desk
 from models.humanoid.skeleton import DEFAULT_MASS
 
 
@@ -47,6 +49,7 @@ class Gui:
 def chosen(mode: str, figure: str, **started: Any) -> Any:
     """The run chosen on a page that was started with a configuration."""
     gui, desk = Gui(), SimpleNamespace(clips={})
+    desk.offer = partial(Desk.offer, desk)
     config = replace(run_config(mode="follow", **started), clock=Clock(servo_period=2e-3))
     panel: Any = RunPanel(gui, desk, lambda does: does, config)  # pyright: ignore[reportArgumentType]
     gui.lists["Mode"].value, gui.lists["Figure"].value = mode, figure

@@ -56,8 +56,8 @@ class RunPanel:
             self._build = gui.add_button("Run this", icon=viser.Icon.PLAYER_PLAY, color="blue")
         self._slots: list[viser.GuiDropdownHandle[Any]] = []
         for file in map(Path, config.map.clips):
-            if file.suffix and file not in desk.clips.values():  # embedded clips have names without
-                desk.clips[str(file) if file.stem in self._clips() else file.stem] = file
+            if file.suffix:  # embedded clips have names without
+                desk.offer(file)
         self._pending_names = self._labels(config)
         self._offered_clips = self._clips()
         self._rebuild_slots()

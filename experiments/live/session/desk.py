@@ -17,6 +17,7 @@ from experiments.live.session.gains import with_gain
 from experiments.live.session.workers import Uploaded, Worker, preparation, verdicts
 from geometry.arrays import Array
 from geometry.whole_files import atomic_file
+from models.mocap.library import embedded_names
 from models.mocap.readers.asf_amc import SKELETON_SUFFIX
 from models.mocap.readers.formats import READABLE_NAMES, UPLOADABLE_SUFFIXES
 from sim.errors import SimError
@@ -326,8 +327,15 @@ class Desk:
     def _add_clip(self, uploaded: Uploaded) -> None:
         self.preparing = None
         if uploaded.path is not None:
-            self.clips[uploaded.path.stem] = uploaded.path
+            self.offer(uploaded.path)
         self._say(uploaded.text)
+
+    def offer(self, file: Path) -> None:
+        """Offer a motion file as a clip, by its stem or, where another clip has that name, by its name or its path."""
+        if file not in self.clips.values():
+            taken = (*self.clips, *embedded_names())
+            name = next(name for name in (file.stem, file.name, str(file)) if name not in taken)
+            self.clips[name] = file
 
     def close(self) -> None:
         """End all processes; a take in progress is saved."""
