@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi
@@ -13,6 +14,7 @@ casadi.GlobalOptions.setNumpyMode(1)
 
 Symbol = Any  # casadi.SX: the library is untyped
 Triple = tuple[float, float, float]
+FUNCTIONS_KEPT = 4  # CasADi functions of devices and laws: a certificate evaluates the same ones for every hand
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,7 @@ def matrix(rows: Any) -> Symbol:
     return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
 
 
+@lru_cache(FUNCTIONS_KEPT)
 def kinematics_function(device: Device) -> Any:
     """CasADi function (θ, θ̇) → J, J̇ θ̇, in H."""
     theta, rate = casadi.SX.sym("theta", 3), casadi.SX.sym("rate", 3)
@@ -72,6 +75,7 @@ def kinematics_function(device: Device) -> Any:
     return casadi.Function("kinematics", [theta, rate], [jacobian, casadi.jtimes(jacobian @ rate, theta, rate)])
 
 
+@lru_cache(FUNCTIONS_KEPT)
 def plant_function(device: Device) -> Any:
     """CasADi function (θ, θ̇, θ̈, p_d, v_d, [m, b, k]) → mass matrix of linkage and hand, ∂ID/∂θ, ∂ID/∂θ̇, ∂N/∂θ.
 

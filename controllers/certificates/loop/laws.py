@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import casadi
 
-from controllers.certificates.loop.device import Device, Symbol, matrix, vector
+from controllers.certificates.loop.device import FUNCTIONS_KEPT, Device, Symbol, matrix, vector
 from controllers.curves.trajectory import PIECE, piece_acceleration, piece_point, piece_velocity
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force, parallel_pace
@@ -99,6 +100,7 @@ HOLD_LAW = Law(_hold, slides=False, carries=False)
 LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
 
 
+@lru_cache(FUNCTIONS_KEPT)
 def torque_function(device: Device, law: Law) -> Any:
     """CasADi function (θ, ω, piece, u, k_r, b_d, width) → torques τ = J(θ)ᵀ F + N(θ), and their derivatives by θ, ω.
 
