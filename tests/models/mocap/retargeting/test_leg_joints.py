@@ -1,0 +1,92 @@
+"""Joints and End Sites of legs that few rigs have: heels, invented tips, joints beside the pelvis."""
+
+import re
+
+import numpy as np
+import pytest
+
+from models.errors import ModelError
+from models.mocap.library import load
+from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
+
+TIP_REMARK = "the file does not define the ends of left foot, right foot: their directions are estimated"
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A function that writes the walk on a rig, changes the text of its hierarchy, and returns the file."""
+
+    def write(rig, change=lambda text: text):
+        path = tmp_path / "r.bvh"
+        write_rig(rig, at_rate("walk", 30.0), path)
+        hierarchy, motion = path.read_text().split("MOTION")
+        path.write_text(change(hierarchy) + "MOTION" + motion)
+        return path
+
+    return write
+
+
+def with_heels(text):
+    """A joint at the heel between ankle and toes, as in OpenSim, of which the heel does not turn."""
+    toes = re.compile(r"JOINT (\w+)ToeBase\s*\{\s*OFFSET (\S+) (\S+) (\S+)(.*?\n\t{4}\})", re.DOTALL)
+    heel = np.array([-5.0, 0.8, -4.0])
+
+    def inserted(match):
+        x, y, z = np.array(match.group(2, 3, 4), dtype=float) - heel
+        offset = " ".join(map(str, heel))
+        name, rest = match[1], match[5]
+        return f"JOINT {name}Calcn {{ OFFSET {offset} JOINT {name}ToeBase {{ OFFSET {x} {y} {z}{rest} }}"
+
+    changed, count = toes.subn(inserted, text)
+    assert count == 2
+    return changed
+
+
+def test_heel_between_ankle_and_toes_changes_nothing(written):
+    plain = load(written(Rig())).clip
+    np.testing.assert_allclose(load(written(Rig(), with_heels)).clip.poses, plain.poses, atol=1e-9)
+
+
+def with_tips(*offset):
+    """A function that moves the End Sites of the feet to an offset from the ankle."""
+
+    def change(text):
+        feet = re.compile(r"(JOINT \w+Foot.*?End Site\s*\{\s*OFFSET )\S+ \S+ \S+", re.DOTALL)
+        changed, count = feet.subn(rf"\g<1>{offset[0]} {offset[1]} {offset[2]}", text)
+        assert count == 2
+        return changed
+
+    return change
+
+
+@pytest.mark.parametrize("tip", [(10, 10, -5), (0, -10, -3), (-8, 0, -5)], ids=["aside", "across", "heel"])
+def test_tips_of_feet_that_do_not_point_ahead_are_not_taken_for_toes(tip, written):
+    rig = Rig(without=("toe",))
+    plain = load(written(rig)).clip
+    loaded = load(written(rig, with_tips(*tip)))
+    np.testing.assert_allclose(loaded.clip.poses, plain.poses, atol=1e-9)
+    assert TIP_REMARK in loaded.report.remarks
+
+
+def test_tips_of_feet_that_point_ahead_are_taken_for_toes(written):
+    assert TIP_REMARK not in load(written(Rig(without=("toe",)), with_tips(15, 0, -5))).report.remarks
+
+
+def test_mirrored_body_whose_feet_have_tips_alone_is_refused(written):
+    def mirrored(text):
+        other = {"Left": "Right", "Right": "Left"}
+        return re.sub("Left|Right", lambda side: other[side[0]], with_tips(15, 0, -5)(text))
+
+    with pytest.raises(ModelError, match="the body is mirrored: toes and knees point back"):
+        load(written(Rig(without=("toe",)), mirrored))
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6])
+def test_joint_beside_the_pelvis_that_is_taken_for_an_unknown_hip_is_refused(share, written):
+    """The line from it to the knee would be up to 7° off the thigh."""
+
+    def renamed(text):
+        return text.replace("_buttock", "HipJoint").replace("UpLeg", "Coxa")
+
+    with pytest.raises(ModelError, match="left thigh bends at LeftCoxa, between LeftHipJoint and LeftLeg"):
+        load(written(Rig(hips=share), renamed))
