@@ -1,4 +1,4 @@
-"""Joints and End Sites of legs that few rigs have: heels, invented tips, joints beside the pelvis."""
+"""Joints and End Sites of legs that few rigs have: heels, invented tips, joints beside the pelvis, still copies."""
 
 import re
 
@@ -90,3 +90,17 @@ def test_joint_beside_the_pelvis_that_is_taken_for_an_unknown_hip_is_refused(sha
 
     with pytest.raises(ModelError, match="left thigh bends at LeftCoxa, between LeftHipJoint and LeftLeg"):
         load(written(Rig(hips=share), renamed))
+
+
+@pytest.mark.parametrize("copied", [r"\g<1>", r"\g<1>1", r"\g<1>_jnt"], ids=["equal name", "number", "suffix"])
+def test_leg_of_a_control_rig_that_does_not_move_is_not_taken(copied, written):
+    """It stands before the leg that moves, and has its joints' names."""
+
+    def with_still_legs(text):
+        legs = re.findall(r"\tJOINT \w+UpLeg\n.*?\n\t\}\n", text, re.DOTALL)
+        still = [re.sub(r"\t*CHANNELS.*\n", "", re.sub(r"(?<=JOINT )(\w+)", copied, leg)) for leg in legs]
+        assert len(legs) == 2
+        return text.replace(legs[0], "".join((*still, legs[0])))
+
+    plain = load(written(Rig())).clip
+    np.testing.assert_allclose(load(written(Rig(), with_still_legs)).clip.poses, plain.poses, atol=1e-9)
