@@ -48,6 +48,7 @@ _MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
 # 0.35 m/s and more where the travel was taken out, and where legs never rest (a swimmer, jumping jacks); elsewhere at
 # 0.25 at most.
 _MAX_IN_PLACE_EXTENT, _MIN_IN_PLACE_TIME, _MIN_SLIDING_SPEED = 0.12, 0.5, 0.3
+_MAX_STRETCH = 0.1  # change of a limb's length over its median that is not reported: below 0.01 in some 180 captures
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -163,6 +164,21 @@ def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
         yield f"the file does not define the ends of {', '.join(without)}: their directions are estimated"
+
+
+def stretch_remarks(lines: BodyLines) -> Iterator[str]:
+    """Bones of arms and legs that change their lengths, as joints that are tracked one by one do."""
+    bones = {"upper arm": (lines.shoulders, lines.elbows), "forearm": (lines.elbows, lines.wrists),
+             "thigh": (lines.hips, lines.knees), "shank": (lines.knees, lines.ankles)}  # fmt: skip
+    changes: dict[str, float] = {}
+    for part, (start, end) in bones.items():
+        shortest, median, longest = np.quantile(np.linalg.norm(end - start, axis=2), [0.05, 0.5, 0.95], axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = (longest - shortest) / median
+        changes |= {f"{side} {part}": float(c) for side, c in zip(SIDES, change, strict=True)}
+    if listed := [f"{part} by {change:.0%}" for part, change in changes.items() if change > _MAX_STRETCH]:
+        which = f"bones change their lengths ({', '.join(listed)}), those of the figure do not"
+        yield f"{which}: its trunk, hips, shoulders, hands and feet are not where those of the file are"
 
 
 def frame_remarks(

@@ -1,4 +1,5 @@
-"""Joints and End Sites of legs that few rigs have: heels, invented tips, joints beside the pelvis, still copies."""
+"""Joints and End Sites of legs that few rigs have: heels, invented tips, joints beside the pelvis, still copies,
+bones that stretch."""
 
 import re
 
@@ -6,7 +7,9 @@ import numpy as np
 import pytest
 
 from models.errors import ModelError
-from models.mocap.library import load
+from models.mocap.library import load, read_motion
+from models.mocap.retargeting.retarget import retarget
+from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
 
 TIP_REMARK = "the file does not define the ends of left foot, right foot: their directions are estimated"
@@ -104,3 +107,17 @@ def test_leg_of_a_control_rig_that_does_not_move_is_not_taken(copied, written):
 
     plain = load(written(Rig())).clip
     np.testing.assert_allclose(load(written(Rig(), with_still_legs)).clip.poses, plain.poses, atol=1e-9)
+
+
+@pytest.mark.parametrize("stretch", [0.0, 0.02, 0.2])
+def test_bones_that_change_their_lengths_are_remarked(stretch, written):
+    """The right knee moves along the thigh by up to `stretch` of its length."""
+    path = written(Rig(positions=True))
+    motion = read_motion(path)
+    knee = motion.joints.index("RightLeg")
+    factor = 1.0 + stretch / 2.0 * np.sin(np.linspace(0.0, 20.0, motion.n_frames))
+    motion.translations[:, knee] *= factor[:, None]
+    remarks = retarget(motion, roles_of(motion.joints, motion.parents))[1].remarks
+    listed = [remark for remark in remarks if "change their lengths" in remark]
+    assert len(listed) == (stretch > 0.1)
+    assert all("(right thigh by 19%)" in remark for remark in listed)
