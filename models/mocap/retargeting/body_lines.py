@@ -18,6 +18,7 @@ from models.mocap.retargeting.skeleton_roles import Roles
 
 SIDES = ("left", "right")
 AT_REST = 0.3  # speed up to which a joint is at rest [leg lengths/s]: a walker's swinging foot has 3
+_MAX_SWAY = 0.03  # largest movement of any joint of a body that holds a pose, relative to its hips [leg lengths]
 _MAX_STILL_STEP = 1e-6  # step of a joint at rest, due to rounding [leg lengths]: files have four decimals or more
 _MIN_PADDING_TIME = 0.5  # least time without any movement in padding [s]: no living body stands so still
 # Step just before or after the padding over the motion's median step, between which the motion was cut while moving:
@@ -76,6 +77,13 @@ class BodyLines(NamedTuple):
     def lowest_joints(self) -> Array:
         """Ankles, or knees where the skeleton ends there, shape (n, 2, 3)."""
         return np.where(np.isnan(self.ankles), self.knees, self.ankles)
+
+    @property
+    def is_single_pose(self) -> bool:
+        """Whether the body holds one pose in all frames, up to the sway of somebody who stands."""
+        parts = (self.knees, self.ankles, self.toes, self.shoulders, self.elbows, self.wrists)
+        places = np.concatenate([part for part in parts if not np.isnan(part).any()], axis=1) - self.middle[:, None]
+        return bool(np.ptp(places, axis=0).max() < _MAX_SWAY * self.leg)
 
     def knee_normals(self) -> Array:
         """Thigh × shank, both of unit length: along the body's left when a knee is bent, shape (n, 2, 3)."""

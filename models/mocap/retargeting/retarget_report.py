@@ -141,8 +141,8 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
         yield f"beyond the figure's range: {', '.join(listed)}; check the file"
 
 
-def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
-    """Soles calibrated from only a few of n frames, a single shoulder, and a spine that is never straight."""
+def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles, n: int) -> Iterator[str]:
+    """Soles calibrated from one pose or a few of n frames, a single shoulder, and a spine that is never straight."""
     few = [
         f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
@@ -151,16 +151,23 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
     if few:
         remark = "the soles' orientation is estimated from few frames"
         yield f"{remark} ({', '.join(few)}); give --rest-frame"
+    elif lines.is_single_pose and {"left_foot", "right_foot"} & roles.segments.keys():
+        yield "the body holds one pose: the soles' orientation is estimated; give --rest-frame if they are level in it"
     if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
         yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 
 
-def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
-    """Limbs whose end is defined neither by a joint nor by a tip."""
+def endless_limb_remarks(lines: BodyLines, calibrated: Calibration, roles: Roles) -> Iterator[str]:
+    """Limbs whose end is defined neither by a joint nor by a tip, and feet whose tips are right below the ankle."""
     ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles, "foot": lines.toes}
-    named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
+    named = [
+        f"{side}_{part}"
+        for part in ends
+        for k, side in enumerate(SIDES)
+        if np.isnan(ends[part][:, k]).any() or (part == "foot" and not calibrated.headings[k])
+    ]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
         yield f"the file does not define the ends of {', '.join(without)}: their directions are estimated"

@@ -8,6 +8,7 @@ import pytest
 
 from models.errors import ModelError
 from models.mocap.library import load, read_motion
+from models.mocap.motion.clip import Clip
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
@@ -121,3 +122,19 @@ def test_bones_that_change_their_lengths_are_remarked(stretch, written):
     listed = [remark for remark in remarks if "change their lengths" in remark]
     assert len(listed) == (stretch > 0.1)
     assert all("(right thigh by 19%)" in remark for remark in listed)
+
+
+def test_soles_of_a_pose_that_is_held_are_remarked_as_an_estimate(tmp_path):
+    pose = at_rate("walk", 30.0).poses[0]
+    for n in (1, 60):
+        write_rig(Rig(), Clip(np.repeat(pose[None], n, axis=0), 30.0, "held"), tmp_path / "r.bvh")
+        assert any("soles' orientation is estimated" in line for line in load(tmp_path / "r.bvh").report.remarks)
+
+
+def test_heading_of_feet_with_tips_below_the_ankle_is_remarked_as_an_estimate(tmp_path):
+    """Of a body that squats throughout: its tips are then not in line with the shank."""
+    path = tmp_path / "r.bvh"
+    write_rig(Rig(without=("toe",)), at_rate("squat_dance", 30.0), path)
+    hierarchy, motion = path.read_text().split("MOTION")
+    path.write_text(with_tips(0, 0, -7)(hierarchy) + "MOTION" + motion)
+    assert TIP_REMARK in load(path).report.remarks
