@@ -107,7 +107,7 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
         motion, roles = stated_roles(hints.roles, motion, people)
     else:
         _check_single_person(motion, people)
-        roles = roles_of(motion.joints, motion.parents)
+        roles = roles_of(motion.joints, motion.parents, still=motion.still_joints)
     if isinstance(roles, str):
         names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
         expected = "the skeleton of a human, or --roles FILE that assigns its joints"

@@ -30,6 +30,11 @@ _MAX_ZERO_RATIO = 1e-3  # largest displacement of a joint, as a fraction of its 
 # to 8.4 and 0.03 to 0.16 in 19 captures of one laboratory; in some 300 others the first is at most 0.1, except in one,
 # where the second is 14.
 _MIN_PARENT_MISFIT, _MAX_WORLD_MISFIT = 1.0, 0.5
+_FULL_TURN = 2.0 * np.pi + 1e-3  # [rad]; in degrees no angle of any of 150 captures is as small
+_RADIANS_REMARK = (
+    "no rotation in the file exceeds 6.3: BVH has degrees, in which this body hardly moves; if these are radians, "
+    "multiply them by 57.3"
+)
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 
@@ -66,6 +71,9 @@ def read_bvh(path: Path) -> SourceMotion:
     translations = np.broadcast_to(offsets, (len(frames), *offsets.shape)).copy()
     rotations = np.zeros((len(frames), len(joints), 4))
     rotations[..., 0] = 1.0
+    turns = np.abs(frames[:, [column for joint in joints for _, column in joint.rotations]])
+    if len(frames) > 1 and 0.0 < turns.max(initial=0.0) <= _FULL_TURN:
+        remarks = (*remarks, _RADIANS_REMARK)
     displaced = _has_displacements(joints, frames)
     for index, joint in enumerate(joints):
         for axis, column in joint.positions:

@@ -77,6 +77,12 @@ class SourceMotion:
         turned = np.abs(self.rotations[:, list(joints), 1:]).max(axis=2, initial=0.0) > _MAX_ZERO_ROTATION
         return ~turned.any(axis=1) & turned.any()
 
+    @property
+    def still_joints(self) -> frozenset[int]:
+        """Joints that do not turn relative to their parents in any frame."""
+        turns = np.ptp(self.rotations, axis=0).max(axis=1)
+        return frozenset(int(joint) for joint in np.flatnonzero(turns < _MAX_ZERO_ROTATION))
+
     def of_joints(self, kept: Sequence[int]) -> "SourceMotion":
         """The motion of some joints in the given order; each joint's parent must be among them."""
         new = {-1: -1} | {joint: k for k, joint in enumerate(kept)}

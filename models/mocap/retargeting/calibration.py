@@ -57,11 +57,14 @@ class Calibration(NamedTuple):
         Least angle between trunk and thighs [rad]: that of the straightest frame.
     stances : tuple of int
         Number of frames from which the left and the right sole were calibrated.
+    headings : tuple of bool
+        Whether the left and the right foot have the heading of their toes.
     """
 
     segments: Array
     bend: float
     stances: tuple[int, int]
+    headings: tuple[bool, bool]
 
 
 def calibrate(
@@ -98,20 +101,22 @@ def calibrate(
         _align_trunk(body.segments, unit(lines.trunk), _left_directions(lines)[1], has_clavicles)
         if "head" not in roles.segments:  # the head follows the chest, which has just been aligned
             body.set("head", body.segment("chest"))
-    counts: list[int] = []
+    feet: list[tuple[int, bool]] = []
     for k in range(len(SIDES)):
         _set_limbs(body, lines, k, weights)
         foot = body.source(f"{SIDES[k]}_foot")
         if foot is None:
             body.set(f"{SIDES[k]}_foot", body.segment(f"{SIDES[k]}_shank"))
-            counts.append(0)
+            feet.append((0, False))
             continue
         flat = foot_flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
         shank = body.segment(f"{SIDES[k]}_shank")
-        sole, used = calibrated_foot(foot, (lines.toes - lines.ankles)[:, k], shank, up, flat, straight)
+        toes, single = (lines.toes - lines.ankles)[:, k], rest_frame is None and lines.is_single_pose
+        sole, used, has_heading = calibrated_foot(foot, toes, shank, up, flat, straight, single)
         body.set(f"{SIDES[k]}_foot", sole)
-        counts.append(used)
-    return Calibration(body.segments, min_bend, (counts[0], counts[1]))
+        feet.append((used, has_heading))
+    (left, left_heading), (right, right_heading) = feet
+    return Calibration(body.segments, min_bend, (left, right), (left_heading, right_heading))
 
 
 class _Body:

@@ -8,7 +8,8 @@ Between the pose and the motion is one step, v₀, that the motion does not cont
 - a body with straight legs and straight arms at least 30° off the trunk, symmetric as T- and A-poses are, whose step
   does not continue in the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
-  interpolation has spread the one step;
+  interpolation has spread the one step; for at most 0.25 s, if they are all in one direction and the largest is 3
+  times as large as the motion's;
 - steps that fade within 0.1 s after such a jump, followed by calm: a filter has spread the jump in this case, too;
 - a first step as large as that of a broken frame at the end of a motion (`broken_frames.first_step_jumps`).
 
@@ -38,6 +39,8 @@ _MIN_JUMP_ANGLE = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no b
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it continues.
 _MAX_BLEND_TIME, _MIN_BLEND_RATIO = 0.1, 1.5
+# The same of a jump that is spread over more time, all in one direction: 0.2 s and 4 to 9 in five files at 25 a second.
+_MAX_SLOW_BLEND_TIME, _MIN_SLOW_BLEND_RATIO = 0.25, 3.0
 # In a jump that fades: largest ratio of the steps after it to its first step, and least cosine between its steps (0.96
 # and more in six captures). No motion begins with three such steps.
 _MAX_CALM_RATIO, _MIN_STEP_COSINE = 0.4, 0.9
@@ -60,7 +63,7 @@ def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines
     jumped = _frames_before_fade(
         turns, _frames_before_jump(rotations, turns, at_rest, lines), round(_MAX_BLEND_TIME * motion.fps)
     )
-    begun, ended = _find_blend(rotations, _rms_angle(turns), round(_MAX_BLEND_TIME * motion.fps))
+    begun, ended = _find_blend(rotations, turns, motion.fps)
     is_early = ended <= _MAX_POSE_FRACTION * motion.n_frames or _first_change(_rms_angle(turns)) == begun
     is_pose = is_early and (at_rest[: begun + 1].all() or _is_calibration_pose(lines))
     frames = max(jumped, ended) if is_pose else jumped
@@ -100,9 +103,7 @@ def _frames_before_fade(turns: Array, jumped: int, longest: int) -> int:
     turns, steps = turns[jumped:], _rms_angle(turns[jumped:])
     length = int(np.argmax(np.append(steps < _MAX_CALM_RATIO * steps[0], True)))
     calm = steps[length : length + longest].max(initial=0.0) < _MAX_CALM_RATIO * steps[0]
-    cosines = np.sum(turns[: length - 1] * turns[1:length], axis=(1, 2)) / turns.shape[1]
-    straight = (cosines > _MIN_STEP_COSINE * steps[: length - 1] * steps[1:length]).all() if length > 2 else False
-    fades = straight and length <= longest and (np.diff(steps[:length]) < 0.0).all()
+    fades = length > 2 and _are_straight(turns[:length]) and length <= longest and (np.diff(steps[:length]) < 0.0).all()
     return jumped + length if fades and calm and steps[:length].sum() > 3.0 * _MIN_JUMP_ANGLE else jumped
 
 
@@ -111,17 +112,32 @@ def _first_change(steps: Array) -> int:
     return int(np.argmax(np.append(steps > _MAX_STILL_STEP, True)))
 
 
-def _find_blend(rotations: Array, steps: Array, longest: int) -> tuple[int, int]:
+def _are_straight(turns: Array) -> bool:
+    """Whether consecutive steps (n, joints, 3) are all in one direction."""
+    steps = _rms_angle(turns)
+    cosines = np.sum(turns[:-1] * turns[1:], axis=(1, 2)) / turns.shape[1]
+    return bool((cosines > _MIN_STEP_COSINE * steps[:-1] * steps[1:]).all())
+
+
+def _find_blend(rotations: Array, turns: Array, fps: float) -> tuple[int, int]:
     """First step, and the one after the last, of a jump by steps that are all larger than the motion's; else (0, 0)."""
-    if longest < 2 or len(steps) < max(MIN_FRAME_COUNT, 4 * longest):
-        return 0, 0
-    usual = float(np.quantile(np.sort(steps)[:-longest], 0.99))
-    large = steps > _MIN_BLEND_RATIO * usual
-    begun = int(np.argmax(large))
-    ended = begun + int(np.argmin(np.append(large[begun:], False)))
-    burst = steps[begun:ended]
-    is_jump = len(burst) <= longest and burst.sum() > 3.0 * _MIN_JUMP_ANGLE
-    return (begun, ended) if is_jump and _is_held(rotations, begun, burst.max()) else (0, 0)
+    steps = _rms_angle(turns)
+    for longest, ratio in (
+        (round(_MAX_BLEND_TIME * fps), _MIN_BLEND_RATIO),
+        (round(_MAX_SLOW_BLEND_TIME * fps), _MIN_SLOW_BLEND_RATIO),
+    ):
+        if longest < 2 or len(steps) < max(MIN_FRAME_COUNT, 4 * longest):
+            continue
+        usual = float(np.quantile(np.sort(steps)[:-longest], 0.99))
+        large = steps > _MIN_BLEND_RATIO * usual
+        begun = int(np.argmax(large))
+        ended = begun + int(np.argmin(np.append(large[begun:], False)))
+        burst = steps[begun:ended]
+        is_jump = len(burst) <= longest and burst.sum() > 3.0 * _MIN_JUMP_ANGLE and burst.max() > ratio * usual
+        is_spread = ratio == _MIN_BLEND_RATIO or _are_straight(turns[begun:ended])
+        if is_jump and is_spread and _is_held(rotations, begun, burst.max()):
+            return begun, ended
+    return 0, 0
 
 
 def _rms_angle(turns: Array) -> Array:

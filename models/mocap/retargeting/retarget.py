@@ -37,6 +37,7 @@ from models.mocap.retargeting.retarget_report import (
     joint_jump_remarks,
     leg_speed_remarks,
     padding_remarks,
+    stretch_remarks,
     unit_name,
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
@@ -119,8 +120,9 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         *([_SITTING_REMARK.format(round(100.0 * hip_shift))] if hip_shift else ()),
         *([_PROPPED_REMARK.format(propped)] if propped else ()),
         *beyond_range_remarks(clip.poses),
-        *endless_limb_remarks(lines, roles),
-        *(calibration_remarks(calibrated, roles, motion.n_frames - frames.dropped) if rest is None else ()),
+        *endless_limb_remarks(lines, calibrated, roles),
+        *stretch_remarks(lines),
+        *(calibration_remarks(calibrated, lines, roles, motion.n_frames - frames.dropped) if rest is None else ()),
     )
     report = RetargetReport(
         {body: motion.joints[joint] for body, joint in roles.segments.items()},

@@ -48,6 +48,7 @@ _MAX_ANKLE_SPEED, _SPEED_QUANTILE = 20.0, 0.9
 # 0.35 m/s and more where the travel was taken out, and where legs never rest (a swimmer, jumping jacks); elsewhere at
 # 0.25 at most.
 _MAX_IN_PLACE_EXTENT, _MIN_IN_PLACE_TIME, _MIN_SLIDING_SPEED = 0.12, 0.5, 0.3
+_MAX_STRETCH = 0.1  # change of a limb's length over its median that is not reported: below 0.01 in some 180 captures
 _UNITS = (
     ("metres", 1.0),
     ("centimetres", 0.01),
@@ -140,8 +141,8 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
         yield f"beyond the figure's range: {', '.join(listed)}; check the file"
 
 
-def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterator[str]:
-    """Soles calibrated from only a few of n frames, a single shoulder, and a spine that is never straight."""
+def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles, n: int) -> Iterator[str]:
+    """Soles calibrated from one pose or a few of n frames, a single shoulder, and a spine that is never straight."""
     few = [
         f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
@@ -150,19 +151,41 @@ def calibration_remarks(calibrated: Calibration, roles: Roles, n: int) -> Iterat
     if few:
         remark = "the soles' orientation is estimated from few frames"
         yield f"{remark} ({', '.join(few)}); give --rest-frame"
+    elif lines.is_single_pose and {"left_foot", "right_foot"} & roles.segments.keys():
+        yield "the body holds one pose: the soles' orientation is estimated; give --rest-frame if they are level in it"
     if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
         yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 
 
-def endless_limb_remarks(lines: BodyLines, roles: Roles) -> Iterator[str]:
-    """Limbs whose end is defined neither by a joint nor by a tip."""
+def endless_limb_remarks(lines: BodyLines, calibrated: Calibration, roles: Roles) -> Iterator[str]:
+    """Limbs whose end is defined neither by a joint nor by a tip, and feet whose tips are right below the ankle."""
     ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles, "foot": lines.toes}
-    named = [f"{side}_{part}" for part in ends for k, side in enumerate(SIDES) if np.isnan(ends[part][:, k]).any()]
+    named = [
+        f"{side}_{part}"
+        for part in ends
+        for k, side in enumerate(SIDES)
+        if np.isnan(ends[part][:, k]).any() or (part == "foot" and not calibrated.headings[k])
+    ]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
     if without:
         yield f"the file does not define the ends of {', '.join(without)}: their directions are estimated"
+
+
+def stretch_remarks(lines: BodyLines) -> Iterator[str]:
+    """Bones of arms and legs that change their lengths, as joints that are tracked one by one do."""
+    bones = {"upper arm": (lines.shoulders, lines.elbows), "forearm": (lines.elbows, lines.wrists),
+             "thigh": (lines.hips, lines.knees), "shank": (lines.knees, lines.ankles)}  # fmt: skip
+    changes: dict[str, float] = {}
+    for part, (start, end) in bones.items():
+        shortest, median, longest = np.quantile(np.linalg.norm(end - start, axis=2), [0.05, 0.5, 0.95], axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = (longest - shortest) / median
+        changes |= {f"{side} {part}": float(c) for side, c in zip(SIDES, change, strict=True)}
+    if listed := [f"{part} by {change:.0%}" for part, change in changes.items() if change > _MAX_STRETCH]:
+        which = f"bones change their lengths ({', '.join(listed)}), those of the figure do not"
+        yield f"{which}: its trunk, hips, shoulders, hands and feet are not where those of the file are"
 
 
 def frame_remarks(

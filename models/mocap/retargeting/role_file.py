@@ -49,7 +49,7 @@ def stated_roles(path: Path, motion: SourceMotion, people: Sequence[Sequence[int
     motion = extract_body(motion, hips, next(iter(whole.values()))) if len(hips) > 1 else motion
     named = _joints_of_roles(path, stated, motion)
     if pelvis_only:
-        roles = roles_of(motion.joints, motion.parents, named["pelvis"])
+        roles = roles_of(motion.joints, motion.parents, named["pelvis"], motion.still_joints)
     else:
         _check_order(path, named, motion)
         roles = assembled(named, names_of(motion.joints), motion.parents)

@@ -5,7 +5,7 @@ is refused. Pelvis, chest and abdomen have many names, so they are found in the 
 the chest where the arms meet, the abdomen halfway between. The tests cover 72 naming schemes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from models.humanoid.skeleton import BODIES, SEGMENTS
@@ -37,7 +37,7 @@ _SIDED_WORDS = frozenset(word for limb in (_LEG, _ARM) for words in limb.values(
 _CENTRAL_WORDS = _CHEST | _NECK | {"head"}
 _OPTIONAL_PARTS = ("clavicle", "toe")  # parts without which a limb is complete
 # Costs of a limb's chain, in decreasing priority: each exceeds all sums of the next; the last is 1 a level of depth.
-_MISSING_COST, _LEAF_COST, _RANK_COST = 10_000_000, 1_000_000, 10_000
+_MISSING_COST, _LEAF_COST, _RANK_COST, _STILL_COST = 100_000_000, 10_000_000, 100_000, 10_000
 
 
 class Roles(NamedTuple):
@@ -58,16 +58,19 @@ class Roles(NamedTuple):
     spine: tuple[int, ...] = ()
 
 
-def roles_of(joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | None = None) -> Roles | str:
+def roles_of(
+    joints: tuple[str, ...], parents: tuple[int, ...], pelvis: int | None = None, still: Collection[int] = ()
+) -> Roles | str:
     """The roles of a skeleton's joints; or, if it is not recognised as a human's, the part without a joint.
 
-    The pelvis is found, too, unless it is stated.
+    The pelvis is found, too, unless it is stated. Of limbs with equal names, one of a control rig that does not move
+    (joints `still`) is not taken.
     """
     names = names_of(joints)
     named: dict[str, int] = {} if pelvis is None else {"pelvis": pelvis}
     for side in ("left", "right"):
         for limb in (_LEG, _ARM):
-            named |= _find_limb(side, limb, names, parents)
+            named |= _find_limb(side, limb, names, parents, still)
         if (toe := named.get(f"{side}_toe")) is not None:
             if f"{side}_foot" not in named and parents[toe] == named.get(f"{side}_shank"):
                 named[f"{side}_foot"] = named.pop(f"{side}_toe")  # an ankle, by what is right above it
@@ -159,12 +162,14 @@ def middle_of(spine: Sequence[int]) -> int:
 
 
 def _find_limb(
-    side: str, limb: dict[str, dict[str, int]], names: tuple[JointName, ...], parents: tuple[int, ...]
-) -> dict[str, int]:
+    side: str, limb: dict[str, dict[str, int]], names: tuple[JointName, ...], parents: tuple[int, ...],
+    still: Collection[int],
+) -> dict[str, int]:  # fmt: skip
     """The likeliest joints of a limb's parts, each below the one before.
 
     Of all such chains, the one with the fewest missing parts; then the one with the fewest leaves, with words that mean
-    only their part, and nearest to the root. Two joints with one word (``thigh.L``, ``thigh.L.001``) are one part.
+    only their part, that moves, and nearest to the root. Two joints with one word (``thigh.L``, ``thigh.L.001``) are
+    one part.
     """
     parent_joints, parts = set(parents), tuple(limb)
     above = {k: set(ancestry(k, parents)[1:]) for k, name in enumerate(names) if name.side == side}
@@ -182,9 +187,8 @@ def _find_limb(
                 if not chain or (joint in above[chain[0][1]] and names[joint].bare != names[chain[0][1]].bare)
             )
             leaf = _LEAF_COST if k < len(parts) - 1 else 1  # where a limb ends, a leaf is as likely
-            cost += (
-                leaf * (joint not in parent_joints) + _RANK_COST * (2 * rank + names[joint].noisy) + len(above[joint])
-            )
+            cost += leaf * (joint not in parent_joints) + _RANK_COST * (2 * rank + names[joint].noisy)
+            cost += _STILL_COST * (joint in still) + len(above[joint])
             longer.append((k, cost, ((f"{side}_{parts[k]}", joint), *rest)))
         chains += longer
     return dict(min((cost + sum(missing_costs[:first]), chain) for first, cost, chain in chains)[1])

@@ -1,5 +1,7 @@
 """Calibration of a rig's soles: a foot that stands on heel and toes has a level sole, and points along its toes."""
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
@@ -86,9 +88,28 @@ def _ground_step(lines: BodyLines, up: Array, fps: float) -> Array:
     return carried if not travels and drifting > resting and np.linalg.norm(carried) > max_rest_step else np.zeros(3)
 
 
+class CalibratedFoot(NamedTuple):
+    """A foot of the figure.
+
+    Attributes
+    ----------
+    rotations : array of shape (frames, 4)
+    used : int
+        Number of stance frames from which the sole's normal is taken; 0 if it is guessed from an ankle in rest pose or
+        from the toes of a single pose.
+    has_heading : bool
+        Whether its heading is that of its toes; otherwise it is the shank's.
+    """
+
+    rotations: Array
+    used: int
+    has_heading: bool
+
+
 def calibrated_foot(
-    source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array
-) -> tuple[Array, int]:  # fmt: skip
+    source: Array, toes: Array, shank: Array, up: Array, flat: npt.NDArray[np.intp], straight: Array,
+    single: bool = False,
+) -> CalibratedFoot:  # fmt: skip
     """Rotations of the figure's foot, whose sole is level in stance and which points along its toes.
 
     Parameters
@@ -103,22 +124,17 @@ def calibrated_foot(
         Stance frames, from `foot_flat_frames`.
     straight : array of shape (frames,)
         Weights of the frames, by how nearly thighs and trunk are in line: ankles are then likely near their rest pose.
-
-    Returns
-    -------
-    rotations : array of shape (frames, 4)
-    used : int
-        Number of stance frames from which the sole's normal is taken; 0 if it is guessed from an ankle in rest pose or
-        from the toes of a single pose.
+    single : bool
+        Whether the body holds one pose in all frames.
     """
     inverse = quaternions.conjugate(source)
     resting = with_constant_offset(source, shank, straight)
     neutral, forward = (quaternions.rotated(inverse, quaternions.rotated(resting, axis))[0] for axis in (_Z, _X))
     ahead = quaternions.rotated(inverse, unit(toes)).mean(axis=0)
-    # A single pose has no mean ankle, and its feet may hang: whether they stand is decided by their toes.
-    single, has_toes = len(source) == 1, bool(np.isfinite(ahead).all())
+    # A pose that is held has no mean ankle, and its feet may hang: whether they stand is decided by their toes.
+    has_toes = bool(np.isfinite(ahead).all())
     expected = _normal_above_toes(ahead, np.cross(neutral, forward)) if single and has_toes else neutral
-    flat = flat if has_toes or not single else flat[:0]
+    flat = flat if has_toes or len(source) > 1 else flat[:0]
     normal, used = _sole_normal(quaternions.rotated(inverse[flat], up), neutral, min(_MIN_FRAME_COUNT, len(source)))
     pitch_error = np.abs(np.arcsin(np.clip(-normal @ unit(ahead), -1.0, 1.0)) - _TOE_PITCH)
     is_flat = used >= _MIN_FLAT_FRAMES and bool(pitch_error < _TOE_PITCH_TOLERANCE)
@@ -126,12 +142,12 @@ def calibrated_foot(
         normal, used = expected, 0
     x = ahead - normal * (ahead @ normal)
     # No toes, or toes right below the ankle: use the heading of the shank.
-    if not np.linalg.norm(x) >= _MIN_TOE_COMPONENT:
+    if not (has_heading := bool(np.linalg.norm(x) >= _MIN_TOE_COMPONENT)):
         x = forward - normal * (forward @ normal)
     x = unit(x)
     columns = np.column_stack((x, np.cross(normal, x), normal))
     constant = np.asarray(Rotation.from_matrix(columns).as_quat(scalar_first=True))
-    return quaternions.product(source, constant), used
+    return CalibratedFoot(quaternions.product(source, constant), used, has_heading)
 
 
 def _normal_above_toes(toes: Array, left: Array) -> Array:

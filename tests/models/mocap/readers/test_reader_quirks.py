@@ -1,6 +1,7 @@
 """Valid but unusual features of the formats, in files of a few lines."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -157,6 +158,19 @@ def test_bvh_frame_beyond_the_declared_number_is_read_and_remarked(tmp_path):
     np.testing.assert_array_equal(joint_positions(motion), joint_positions(read_text(tmp_path, CHAIN)))
     assert motion.remarks == ("the file has 2 frames, one more than the 1 it declares: the last one is read, too",)
     assert read_text(tmp_path, CHAIN).remarks == ()
+
+
+def test_bvh_whose_angles_may_be_in_radians_is_remarked(tmp_path):
+    """No angle exceeds a full turn in radians; a single frame, often the rest pose, is not remarked."""
+    angles = re.compile(r"(?<=\d )10 20 30 40 50 60\n|370 20 30 40 50 -300\n")
+    radians = angles.sub("0.1 0.2 0.3 0.4 0.5 -6.28\n", CHAIN)
+    for text, remarked in ((CHAIN, False), (radians, True), (one_frame(radians), False)):
+        assert any("if these are radians" in remark for remark in read_text(tmp_path, text).remarks) == remarked
+
+
+def one_frame(text):
+    """The first of two frames alone."""
+    return text.replace("Frames: 2", "Frames: 1").rsplit("11 21", 1)[0]
 
 
 def test_remarks_of_a_reader_are_in_the_report(tmp_path):

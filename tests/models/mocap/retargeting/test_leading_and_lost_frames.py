@@ -120,6 +120,22 @@ def test_leading_arms_out_pose_blended_into_the_motion_is_dropped(name, held, tm
     assert largest_angle(Clip(kept, clip.fps, name), plain) < 1.0
 
 
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])
+def test_leading_arms_out_pose_that_a_filter_has_spread_over_a_fifth_of_a_second_is_dropped(fps, tmp_path):
+    """Before a motion that is much slower than the steps of the filter, of which the last ones may remain."""
+    clip = at_rate("cheer", fps)
+    calm = Clip(np.repeat(clip.poses[:1], 4 * round(fps), axis=0), fps, "calm")
+    calm.poses[:, 7:11] = Rotation.from_euler("z", 0.1 * np.sin(np.arange(calm.n_frames) / fps)[:, None]).as_quat(
+        scalar_first=True
+    )
+    first, n = calm.poses[0, 3:].reshape(-1, 4), round(0.2 * fps)
+    pose = np.tile([1.0, 0.0, 0.0, 0.0], (len(BODIES), 1))
+    shares = np.sin(np.pi / 2.0 * np.arange(n) / n)
+    blended = [np.concatenate((calm.poses[0, :3], quaternions.slerped(pose, first, s).ravel())) for s in shares]
+    write_rig(Rig(zero="random", seed=5), Clip(np.vstack((blended, calm.poses)), fps, "calm"), tmp_path / "led.bvh")
+    assert n - 1 <= load(tmp_path / "led.bvh", UP).report.dropped <= n
+
+
 @pytest.mark.parametrize("name", embedded_names())
 def test_motion_that_begins_at_any_frame_keeps_its_frames(name, tmp_path):
     write_rig(Rig(), embedded(name), tmp_path / "r.bvh")

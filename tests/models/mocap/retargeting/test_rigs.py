@@ -353,9 +353,10 @@ def posed(turns, clip):
     return Clip(poses, clip.fps, f"{clip.name} posed")
 
 
-def test_hanging_foot_in_a_single_pose_is_not_levelled(motions, tmp_path):
+@pytest.mark.parametrize("n_frames", [1, 60])
+def test_hanging_foot_in_a_pose_that_is_held_is_not_levelled(n_frames, motions, tmp_path):
     """Without other stances to compare with, the toes distinguish a standing from a hanging foot."""
-    still = Clip(motions.clip("cheer").poses[:1], 30.0, "pose")
+    still = Clip(np.repeat(motions.clip("cheer").poses[:1], n_frames, axis=0), 30.0, "pose")
 
     def down(clip):
         """Angle of the left toes below the horizontal [°]."""
