@@ -29,7 +29,8 @@ _MIN_LAP_DURATION, _MAX_LAP_DURATION = 3.0, 6.0  # [s] limits of a natural lap, 
 # [s] longest natural lap but for one stride of the first loop: at 10 mm/s and less, encoders and friction disturb the
 # hand's pace, so that legs of 6.8 s have 25 % residual in a lap of 68 s, and 12 in one of 27 with arms 2.5 as fast
 _MAX_STEADY_LAP = 30.0
-_MIN_TRAVEL = 0.3  # [m] a lap that travels less is not a gait
+MIN_TRAVEL = 0.3
+"""Travel of a lap below which it is not a gait [m]."""
 
 
 def strides(loop: Loop) -> int:
@@ -66,7 +67,7 @@ def fit_to_lap(loops: Sequence[Loop], lap: float | None = None, apart: bool = Fa
         wanted = next((count for count in counts if count > 1), 1)
         shares = [wanted / count if count > 1 else 1.0 for count in counts]
     else:
-        travels = [not apart and float(np.hypot(*loop.drift[:2])) > _MIN_TRAVEL for loop in loops]
+        travels = [not apart and float(np.hypot(*loop.drift[:2])) > MIN_TRAVEL for loop in loops]
         durations = np.array([loop.duration / count for loop, count in zip(loops, counts, strict=True)])
         common = _best_repeat_count(durations[travels], lap) if any(travels) else 1
         shares = [

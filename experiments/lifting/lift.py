@@ -1,11 +1,5 @@
-"""Lifting of clips by name or file: a curve for each, and one haptic map with all of them.
+"""Lifting of clips by name or file: a curve for each, and one haptic map with all of them."""
 
-A closed clip shorter than `_MIN_LAP_DURATION` is repeated along its curve, since no hand can be led evenly round a lap
-in half a second: a captured run with strides of 0.55 s had a residual of 21 % of body weight with one stride a lap, and
-of 11 % with two.
-"""
-
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,17 +15,15 @@ from controllers.haptic_map.lifting.transitions import MapTransition
 from controllers.motion.loops import append_reversal, checked_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.map_quality import N_SAMPLES, Layout, body_weights, lap_times
+from experiments.lifting.repeats import repeated
 from experiments.setups.parts.clips import load_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.poses import extend_periodically
 from models.one_blas_thread import on_one_blas_thread
 from sim.errors import SimError
 from sim.world.world import phantom_angles
-
-_MIN_LAP_DURATION = 2.0  # [s]; with 4 s a sprint is repeated 8 times, and the figure falls because of encoder noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +124,7 @@ def lift_clips(
         for clip, name in zip(loaded, names, strict=True)
     )
     turned = tuple(clip.n_frames > as_loaded.n_frames for clip, as_loaded in zip(clips, loaded, strict=True))
-    rounds = tuple(math.ceil(_MIN_LAP_DURATION / clip.duration) if clip.closes() else 1 for clip in clips)
-    clips = tuple(_repeat(clip, times) for clip, times in zip(clips, rounds, strict=True))
+    clips, rounds = repeated(clips)
     labels = _unique_labels(names)
     motions = [_motion(clip, label, name in cyclic) for clip, label, name in zip(clips, labels, names, strict=True)]
     lifting = lift(motions, body_weights(), room, np.random.default_rng(seed))
@@ -143,12 +134,6 @@ def lift_clips(
         lifting.sites, figure_legs(figure_model()), labels, transitions=transitions,
     )  # fmt: skip
     return LiftedClips(clips, turned, rounds, labels, remarks, lifting, haptic_map, time.perf_counter() - begin)
-
-
-def _repeat(clip: Clip, times: int) -> Clip:
-    """A closed clip repeated several times."""
-    poses, first = extend_periodically(clip, (times - 1) * (clip.n_frames - 1))
-    return replace(clip, poses=poses[first:])
 
 
 def _unique_labels(names: Sequence[str]) -> tuple[str, ...]:

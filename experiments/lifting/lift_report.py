@@ -50,7 +50,7 @@ class LiftReport(NamedTuple):
             strict=True,
         ):  # fmt: skip
             kind = "there and back" if turned else "closed" if closed else "open, the hand is held at its end"
-            kind = kind if rounds == 1 else f"{rounds} times round"
+            kind = kind if rounds == 1 else f"{rounds} times in a lap"
             yield (
                 f"  {name}: {kind}, {clip.duration:.2f} s, radius of curvature from "
                 f"{1e3 * curve.radius:.0f} mm, up to {curve.speed:.2f} m/s and {curve.acceleration:.2f} m/s²"

@@ -3,7 +3,7 @@ r"""Energy of curves round the z axis with sites (r_i(θ), z_i(θ)), by the cont
 .. math:: E = \sum_{i<j} \Bigl\langle w\, \frac{(D_{ij} - T_{ij})^2}{\bar T^2}
           + \Bigl(1 - \frac{D_{ij}}{S_{ij}}\Bigr)_+^2 + v\, |q_i' - q_j'|^2 \Bigr\rangle
           + \sum_i \langle (1 + \dot\theta_i^4/\omega^4)\, |q_i''|^2
-          + s\, (\gamma_i |q_i'|)^2 + limits \rangle,
+          + (\gamma_i |q_i'|)^2 + limits \rangle,
           \qquad \gamma_i = \frac{u}{\dot\theta_i \bar r^2}
 
 D is the distance of two sites at an angle, T = κ d the distance of the two poses there scaled to the size of the
@@ -12,10 +12,9 @@ figure equally everywhere, so h_* is well conditioned. At a transition T falls t
 parallel; elsewhere S keeps them apart. The bending term grows with θ̇: where the radius changes, springs and filters
 track the tangential acceleration 2 θ̇² r' with an error, which shifts the hand's angle and with it the clip's phase. A
 push across a curve has a part along it where the curve slants: it changes the pace of the clip by γ |q'|, relative,
-with u the speed that it adds along itself and r̄ the radius in the middle of the rectangle; s goes from 0 to 1 as the
-longest lap of the clips goes from 4 to 6 s. If only slow curves were level, those beside them would slant the more.
-`limits` penalises excessive speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the
-rectangle, hence so do the sites.
+with u the speed that it adds along itself and r̄ the radius in the middle of the rectangle. `limits` penalises
+excessive speed and acceleration. Sites are periodic cubic B-splines whose control points lie in the rectangle, hence so
+do the sites.
 
 Every term is a sum of squares or convex, so each has a positive semidefinite curvature: that of a pair's stress is
 
@@ -37,9 +36,10 @@ from geometry.easing import cubic_steps
 N_ROWS = 64  # control points round the lap
 _SAMPLES_PER_ROW = 3
 N_ANGLES = N_ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
-# Sensitivities of the constants in this file are for walk, run, jump and backflip. Walk and run pass within 7.7 mm of
-# each other, jump and backflip within 4.4 mm; h_* changes by at most 74 % of itself per millimetre at nine of ten
-# places. Those in other files of this folder were found in a room with r from 20 mm on, before arrangements converged.
+# Sensitivities of the constants in this file are for walk, run, jump and backflip, with curves that slant and two strides
+# of the walk to three of the run: they pass within 7.7 mm of each other, jump and backflip within 4.4 mm, and h_*
+# changes by at most 74 % of itself per millimetre at nine of ten places (now 8.5, 6.1 mm and 67 %). Those in other files
+# of this folder were found in a room with r from 20 mm on, before arrangements converged.
 
 # [rad] distance from a transition within which two curves may be nearer than the separation. With half of it the
 # distances are 9.7 and 8.4 mm, with twice 6.2 and 2.6.
@@ -54,9 +54,6 @@ _MIN_DISTANCE_RATIO = 0.2
 # changes them by 0.3 mm, the bend weight by 0.4, the approach weight by 0.6. The median condition number of h_* half
 # way between two curves, 26.8, changes by 0.7, with the bend weight by 3.9.
 _SEPARATION_WEIGHT, _APPROACH_WEIGHT, _TANGENT_WEIGHT, _BEND_WEIGHT, _LIMIT_WEIGHT = 40.0, 250.0, 0.7, 0.015, 40.0
-# [s] Longest laps between which s goes from 0 to 1. A push changes the pace of a captured kick of 7 s by 8 % instead of
-# 236 %. Maps of fast clips keep their slants: with level curves a figure fell that went from embedded run to walk.
-_SLOW_LAPS = (4.0, 6.0)
 PUSH_SPEED = 2.5 / 8.0
 """Speed that a push of 2.5 N adds against a damping of 8 N s/m [m/s]."""
 # [rad/s] ω: a captured walk with a residual of 1.7 % of weight has 4.7 % on its curve, with ω = 3 rad/s 11 %
@@ -194,9 +191,7 @@ class Energy:
             self._parallel[:, pair] += (_TANGENT_WEIGHT * np.maximum(1.0 - 3.0 * near, 0.0) / _SLOPE_UNIT)[:, None]
         middle = 0.5 * (task.rectangle.r_min + task.rectangle.r_max)
         pace_change = PUSH_SPEED / (task.rate * middle**2)  # γ
-        laps = 2.0 * np.pi * (1.0 / task.rate).mean(axis=0)
-        slow = cubic_steps((laps.max(initial=0.0) - _SLOW_LAPS[0]) / (_SLOW_LAPS[1] - _SLOW_LAPS[0]))
-        self._slope_stiffness = slow * pace_change**2 / N_ANGLES
+        self._slope_stiffness = pace_change**2 / N_ANGLES
         self._bend_stiffness = _BEND_WEIGHT / _SLOPE_UNIT * (1.0 + (task.rate / _BEND_RATE) ** 4)
 
     def __call__(self, flat: Array) -> Expansion:

