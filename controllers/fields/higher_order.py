@@ -11,6 +11,7 @@ from controllers.checks import check_field_types, checked
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
 from controllers.curves.trajectory import END, PERIODIC, START, Trajectory, curve_point, curve_velocity
+from controllers.errors import ParameterError
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.algebra.instructions import TRACE_RIVER, write_trace
 from controllers.fields.algebra.law import Law, Program
@@ -20,12 +21,14 @@ from controllers.fields.follow import follow_force
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from controllers.work_array import work_array
 from geometry.arrays import Array
+from geometry.easing import smooth_step
 
 
 class Crossing(NamedTuple):
     """Parameters of `higher_order_wrench`, followed by the offsets of the rivers' blocks (from here) and the blocks.
 
-    Flag for the discrete form, 1/2σ² [s²/m²], r and r + h [m/s], number of rivers, time constant of the low-pass [s].
+    Flag for the discrete form, 1/2σ² [s²/m²], r and r + h [m/s], number of rivers, time constant of the low-pass [s],
+    and T_e [s].
     """
 
     discrete: float
@@ -34,6 +37,7 @@ class Crossing(NamedTuple):
     release: float
     rivers: float
     look: float
+    ease: float
 
 
 class RiverGains(NamedTuple):
@@ -54,13 +58,17 @@ _HEADER_SIZE, _GAINS_SIZE = len(Crossing._fields), len(RiverGains._fields)
 # Columns of the table of candidate branches.
 _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE_SIZE = range(6)
 
-# Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s]].
-_ACTIVE, _ACTIVE_PHASE, _LAST_TIME, _FILTERED_VELOCITY, _MEMORY_SIZE = 0, 1, 2, 3, 6
+# Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s], time [s] at
+# which the active river took the hand, and the hand's pace there].
+_ACTIVE, _ACTIVE_PHASE, _LAST_TIME, _FILTERED_VELOCITY, _TAKEN_TIME, _TAKEN_PACE = 0, 1, 2, 3, 6, 7
+_NO_MEMORY = (-1.0, 0.0, np.nan, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @njit
 def _read_crossing(params: Array, at: int) -> Crossing:
-    return Crossing(params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5])
+    return Crossing(
+        params[at], params[at + 1], params[at + 2], params[at + 3], params[at + 4], params[at + 5], params[at + 6]
+    )
 
 
 @njit
@@ -92,24 +100,36 @@ def mismatch(square: float, towards: float, draw: float, pace: float) -> float:
 
 
 @njit
+def _nearest_admissible(
+    params: Array, river: RiverGains, speeds: int, curve: int, phase: float, v: Array
+) -> tuple[float, float]:
+    """Speed along a branch [m/s] that a river admits and that is nearest to the hand's, and |φ̇| [m/s]."""
+    tangent, along, square = curve_velocity(params, curve, phase), 0.0, 0.0
+    for i in range(3):
+        along += v[i] * tangent[i]
+        square += tangent[i] ** 2
+    speed = max(math.sqrt(square), 1e-12)
+    rows = int(river.speeds)
+    if rows == 0:
+        return speed, speed
+    share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
+    least, greatest = admissible_speeds(params, speeds, rows, share)
+    return min(max(along / speed, least), greatest), speed
+
+
+@njit
 def _branch_mismatch(
     params: Array, river: RiverGains, speeds: int, curve: int, phase: float, p: Array, v: Array
 ) -> float:
     point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
-    pace = tangent[0] ** 2 + tangent[1] ** 2 + tangent[2] ** 2
-    speed = max(math.sqrt(pace), 1e-12)
-    s = speed
-    rows = int(river.speeds)
-    if rows > 0:
-        share = (phase - params[curve + START]) / (params[curve + END] - params[curve + START])
-        least, greatest = admissible_speeds(params, speeds, rows, share)
-        s = min(max((v[0] * tangent[0] + v[1] * tangent[1] + v[2] * tangent[2]) / speed, least), greatest)
-    square = towards = draw = 0.0
+    s, speed = _nearest_admissible(params, river, speeds, curve, phase, v)
+    square = towards = draw = pace = 0.0
     for i in range(3):
         e, y = v[i] - s / speed * tangent[i], (point[i] - p[i]) / river.tau
         square += e * e
         towards += e * y
         draw += y * y
+        pace += tangent[i] ** 2
     return mismatch(square, towards, draw, pace + 1e-24)
 
 
@@ -134,7 +154,7 @@ def _candidates(params: Array, at: int, p: Array, v: Array, table: Array) -> int
 @njit
 def _filter_velocity(look: float, memory: Array, slot: int, t: float, v: Array) -> Array:
     """Low-passed hand velocity [m/s] that selects the river; unfiltered if no time has passed or the filter is off."""
-    filtered = memory[slot + _FILTERED_VELOCITY : slot + _MEMORY_SIZE]
+    filtered = memory[slot + _FILTERED_VELOCITY : slot + _TAKEN_TIME]
     elapsed = t - memory[slot + _LAST_TIME]
     # The comparison is false for the NaN of the first evaluation.
     share = 1.0 - math.exp(-elapsed / look) if look > 0.0 and elapsed > 0.0 else 1.0
@@ -145,11 +165,13 @@ def _filter_velocity(look: float, memory: Array, slot: int, t: float, v: Array) 
 
 
 @njit
-def _add_force(params: Array, at: int, row: Array, share: float, p: Array, v: Array, wrench: Array) -> None:
+def _add_force(
+    params: Array, at: int, row: Array, share: float, pace: float, p: Array, v: Array, wrench: Array
+) -> None:
     river, _, curve = _read_river(params, at, row[_RIVER])
     p_curve, v_curve = curve_point(params, curve, row[_PHASE]), curve_velocity(params, curve, row[_PHASE])
     for i in range(3):
-        force = follow_force(p[i], v[i], p_curve[i], v_curve[i], river.k_r, river.b_d)
+        force = follow_force(p[i], v[i], p_curve[i], pace * v_curve[i], river.k_r, river.b_d)
         wrench[i] += share * row[_WINDOW] * force
 
 
@@ -169,7 +191,7 @@ def _add_smooth_forces(params: Array, at: int, table: Array, count: int, p: Arra
         if a > strongest:
             strongest, selected = a, k
     for k in range(count):
-        _add_force(params, at, table[k], math.exp(-sharpness * (table[k, _SCORE] - least)) / total, p, v, wrench)
+        _add_force(params, at, table[k], math.exp(-sharpness * (table[k, _SCORE] - least)) / total, 1.0, p, v, wrench)
     return selected
 
 
@@ -201,6 +223,21 @@ def _select_river(params: Array, at: int, table: Array, count: int, memory: Arra
 
 
 @njit
+def _eased_pace(params: Array, at: int, row: Array, taken: bool, memory: Array, slot: int, t: float) -> float:
+    """Pace s of the active river's current along its curve; `taken` if the hand has just come into this river."""
+    ease = _read_crossing(params, at).ease
+    if ease <= 0.0:
+        return 1.0
+    if taken:
+        river, speeds, curve = _read_river(params, at, row[_RIVER])
+        v = memory[slot + _FILTERED_VELOCITY : slot + _TAKEN_TIME]
+        s, speed = _nearest_admissible(params, river, speeds, curve, row[_PHASE], v)
+        memory[slot + _TAKEN_TIME], memory[slot + _TAKEN_PACE] = t, s / speed
+    share = smooth_step((t - memory[slot + _TAKEN_TIME]) / ease)
+    return share + (1.0 - share) * memory[slot + _TAKEN_PACE]
+
+
+@njit
 def higher_order_wrench(
     params: Array, at: int, curve: int, memory: Array, slot: int, hand: Array, wrench: Array
 ) -> None:
@@ -214,9 +251,12 @@ def higher_order_wrench(
     table = work_array((int(crossing.rivers) * BRANCHES + 1, _CANDIDATE_SIZE))
     count = _candidates(params, at, p, _filter_velocity(crossing.look, memory, slot, hand[HAND_TIME], v), table)
     if crossing.discrete > 0.0:
+        before = memory[slot + _ACTIVE]
         selected = _select_river(params, at, table, count, memory, slot)
         if selected >= 0:
-            _add_force(params, at, table[selected], 1.0, p, v, wrench)
+            taken = before != memory[slot + _ACTIVE]
+            pace = _eased_pace(params, at, table[selected], taken, memory, slot, hand[HAND_TIME])
+            _add_force(params, at, table[selected], 1.0, pace, p, v, wrench)
     else:
         selected = _add_smooth_forces(params, at, table, count, p, v, wrench)
     _write_trace(params, at, table, count, selected, memory, p)
@@ -259,6 +299,9 @@ class HigherOrder(Law):
     it stays active while s_i < r + h, unless s_j + h < s_i for another river j; the force jumps at a change. As σ → 0
     both forms select the river of smallest m_i, if m_i < r.
 
+    A river may bring a hand of another pace to its own gradually: in the discrete form its current along the curve is
+    s φ̇_i, and s goes from the admissible speed nearest to the hand's when it was taken, over |φ̇_i|, within T_e to 1.
+
     Each branch of a river (`controllers.curves.branches`) takes part separately, so a river that crosses itself is
     treated like two rivers that cross.
 
@@ -278,11 +321,14 @@ class HigherOrder(Law):
     look : float
         Time constant of a low-pass on the velocity that selects the river [s], against measurement noise; 0 for no
         filter. The forces use the unfiltered velocity.
+    ease : float
+        T_e [s], of the discrete form; 0 for a current that is always the river's own.
 
     Raises
     ------
     ParameterError
-        If r or σ is below 1e-6 m/s, h or the time constant negative, one of them not finite, or the form unknown.
+        If r or σ is below 1e-6 m/s, h or a time negative, one of them not finite, or the form unknown; or if the smooth
+        form is given T_e.
     """
 
     bundle: RiverBundle
@@ -291,10 +337,14 @@ class HigherOrder(Law):
     hysteresis: float = 0.0
     form: Literal["smooth", "discrete"] = "smooth"
     look: float = 0.0
+    ease: float = 0.0
 
     def __post_init__(self) -> None:
         check_field_types(self)
         checked("look", self.look, "s")
+        checked("ease", self.ease, "s")
+        if self.form == "smooth" and self.ease > 0.0:
+            raise ParameterError("the smooth form has no single river to ease a hand into; leave out ease")
         checked("admission", self.admission, "m/s", least=1e-6)
         checked("sigma", self.sigma, "m/s", least=1e-6)
         checked("hysteresis", self.hysteresis, "m/s")
@@ -314,7 +364,6 @@ class HigherOrder(Law):
             blocks.append(np.concatenate([gains, speeds, river.curve.packed()]))
         release = self.admission + self.hysteresis
         discrete = float(self.form == "discrete")
-        header = Crossing(discrete, 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look)
+        header = Crossing(discrete, 0.5 * self.sigma**-2, self.admission, release, len(blocks), self.look, self.ease)
         offsets = np.cumsum([_HEADER_SIZE + len(blocks), *(len(block) for block in blocks[:-1])])
-        memory = [-1.0, 0.0, np.nan, 0.0, 0.0, 0.0]
-        return Program.of(self, higher_order_wrench, np.concatenate([header, offsets, *blocks]), memory)
+        return Program.of(self, higher_order_wrench, np.concatenate([header, offsets, *blocks]), _NO_MEMORY)

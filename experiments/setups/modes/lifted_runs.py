@@ -22,6 +22,9 @@ from sim.users.hand.actions import Push
 
 # Admissible speeds over the river's own: a hand from a neighbouring river has that river's speed.
 _SPEED_RANGE = (0.5, 2.0)
+# [s] in which a river brings a hand to its own pace: from walk to run within 0.35 s the figure falls at all of twelve
+# angles, if the pace changes as fast, and at none if it takes a second (`experiments.studies.gait_changes`)
+_EASE_TIME = 1.0
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 # [s] from the start of a push to the transition: with 0.34 to 0.55 the figure stays up (nine pushes)
 _PUSH_LEAD_TIME = 0.36
@@ -85,7 +88,7 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
     """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
     pace = max(fastest(river.curve) for river in bundle.rivers)
-    return RiverChoice(bundle, given, pace, SIDE_BY_SIDE_HYSTERESIS * pace)
+    return RiverChoice(bundle, given, pace, SIDE_BY_SIDE_HYSTERESIS * pace, _EASE_TIME)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:

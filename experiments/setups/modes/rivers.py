@@ -85,11 +85,17 @@ def river_time(mode: Rivers) -> float:
 
 def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
     """Law of force of several rivers: their sum, or a higher-order law that gives the hand to one river."""
-    bundle, _, pace, hysteresis = choice
+    bundle, _, pace, hysteresis, ease = choice
     if mode.crossing == "sum":
         return bundle
     return HigherOrder(
-        bundle, admission * pace, SIGMA[mode.crossing] * pace, hysteresis, mode.crossing, SELECTION_TIME_CONSTANT
+        bundle,
+        admission * pace,
+        SIGMA[mode.crossing] * pace,
+        hysteresis,
+        mode.crossing,
+        SELECTION_TIME_CONSTANT,
+        ease if mode.crossing == "discrete" else 0.0,
     )
 
 

@@ -65,12 +65,15 @@ class RiverChoice(NamedTuple):
         Reference speed [m/s] that scales the thresholds by which the law tells them apart (`rivers.law_of`).
     hysteresis : float
         Margin in favour of the river that already has the hand [m/s].
+    ease : float
+        Time in which a river brings a hand that it has taken to its own pace [s].
     """
 
     bundle: RiverBundle
     given: tuple[Trajectory, ...]
     pace: float
     hysteresis: float
+    ease: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

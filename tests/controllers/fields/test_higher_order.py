@@ -1,5 +1,7 @@
 """Fields of higher order: the selection of a river by the hand's velocity, at crossings of every kind."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -170,6 +172,34 @@ def test_hysteresis_keeps_a_hand_between_admission_and_release():
     taken = np.linalg.norm(forces, axis=1) > 0.0
     assert taken.tolist() == [False, True, True, False, False, True]
     assert memory[TRACE_RIVER] == 0.0
+
+
+def test_river_brings_a_hand_to_its_own_pace_within_the_ease_time():
+    river = replace(straight_river(0.0), speeds=[[0.6 * SPEED, 2.0 * SPEED]] * 2)
+    program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.4).program()
+    times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    for pace, first in ((0.7, 0.7), (1.3, 1.3), (0.3, 0.6)):
+        # A hand that keeps its pace feels the damper against the current's; it is on the curve, where w = 1.
+        hands = [HandState.at(river.curve.point(0.8 + pace * t), [pace * SPEED, 0, 0], t) for t in times]
+        forces, _ = _run(program, hands)
+        u = times.clip(0.0, 0.4) / 0.4
+        current = first + (1.0 - first) * (10.0 * u**3 - 15.0 * u**4 + 6.0 * u**5)
+        np.testing.assert_allclose(forces[:, 0], river.drag * (current - pace) * SPEED, atol=1e-9)
+
+
+def test_each_taking_of_a_hand_eases_it_anew():
+    river = replace(straight_river(0.0), speeds=[[0.5 * SPEED, 2.0 * SPEED]] * 2)
+    program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.1).program()
+    lost = HandState.at([0.0, 1.0, 0.0], [0.5 * SPEED, 0, 0], 0.3)
+    slow = [HandState.at(river.curve.point(0.8), [0.5 * SPEED, 0, 0], t) for t in (0.0, 0.2)]
+    forces, _ = _run(program, [*slow, lost, slow[0]._replace(t=0.4), slow[0]._replace(t=0.6)])
+    along = forces[:, 0] / (river.drag * SPEED)
+    np.testing.assert_allclose(along, [0.0, 0.5, 0.0, 0.0, 0.5], atol=1e-9)
+
+
+def test_smooth_form_refuses_an_ease_time():
+    with pytest.raises(ParameterError, match="leave out ease"):
+        HigherOrder(_bundle(straight_river(0.0)), *SCALE, ease=1.0)
 
 
 def test_discrete_river_keeps_the_hand_to_the_edge_of_its_tube_at_nearly_parallel_rivers():
