@@ -33,7 +33,7 @@ def test_map_file_contains_the_found_transitions(map_file: Path) -> None:
 
 
 @pytest.mark.usefixtures("without_page")
-@pytest.mark.parametrize(("curve", "seconds"), [("walk", 2.2), ("run", 2.2), ("jump", 2.4)])
+@pytest.mark.parametrize(("curve", "seconds"), [("walk", 3.3), ("run", 2.2), ("jump", 2.4)])
 def test_follow_on_lifted_map_keeps_pace_and_figure_stands(
     map_file: Path, tmp_path: Path, curve: str, seconds: float
 ) -> None:
@@ -78,7 +78,7 @@ def test_relaxed_hand_stays_with_the_walk_through_the_transition(map_file: Path,
 def test_push_at_the_transition_switches_between_walk_and_run(
     map_file: Path, tmp_path: Path, first: str, second: str
 ) -> None:
-    config = run_config(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.0)
+    config = run_config(map=str(map_file), mode="rivers", curve=first, user="push", seconds=10.5)
     summary = run(config, tmp_path / "pushed", True, 0.0)
     (change,) = summary.changes
     assert (change.before, change.after) == (first, second)
@@ -91,9 +91,9 @@ def test_push_at_the_transition_switches_between_walk_and_run(
         frames, weight = recording.channel("frames", "t")[:], recording.arrays["body_weight"]
     at = p[np.searchsorted(t, change.t)]
     assert abs(np.remainder(np.arctan2(at[1], at[0]) - angle + np.pi, 2.0 * np.pi) - np.pi) < 0.3
-    # For at least five seconds the hand stays in the other river, and the figure with its clip.
+    # For at least four seconds the hand stays in the other river, and the figure with its clip.
     assert distance[-2000:].max() < 1e-3
-    assert config.seconds - change.t > 5.0
+    assert config.seconds - change.t > 4.0
     assert summary.figure.fell_at is None
     # 1.9 to 6.5 cm, and residuals of 0.084 to 0.118, in 16 runs: seeds, weights and kernels of OpenBLAS.
     assert summary.figure.root_error_max_cm < 12.0
@@ -103,8 +103,9 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     force = np.linalg.norm(residual[:, :3], axis=1) / weight
     away = (frames < change.t - 0.5) | (frames > change.t + 1.0)
     assert np.sqrt(np.mean(force[away] ** 2)) < 0.08
-    lap = round(2.2 / (frames[1] - frames[0]))
-    speed = np.linalg.norm(reference[-1, :2] - reference[-1 - lap, :2]) / 2.2
+    seconds = 2.2 if second == "run" else 3.3
+    lap = round(seconds / (frames[1] - frames[0]))
+    speed = np.linalg.norm(reference[-1, :2] - reference[-1 - lap, :2]) / seconds
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 

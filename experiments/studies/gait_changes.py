@@ -1,0 +1,110 @@
+"""Experiment that could refute changes between gaits on a lifted map: hands go from one curve to another at any angle.
+
+``python -m experiments.studies.gait_changes MAP.npz FIRST SECOND`` moves a hand from curve to curve of a map that
+`hvf lift` wrote, begun at twelve angles, and holds it at shares of the way between them. The physical figure follows
+each animation, and a table shows its residual, or when it falls.
+
+A hand has changed its pace over the same time as its place, or over another one: a river that takes a hand sets the
+pace of its own clip at once, or within a second (`controllers.fields.higher_order.HigherOrder.ease`).
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from controllers.haptic_map.lifted import Lifted
+from controllers.state import stylus_path
+from experiments.files.map_files import load_figure_map
+from experiments.fitting.verdict import FPS, Verdict
+from experiments.preparation.tracking_trial import followed
+from experiments.setups.modes.lifted_runs import curve_number
+from geometry.arrays import Array
+from geometry.easing import smooth_steps
+from models.mocap.motion.clip import Clip
+from sim.compilation.unit_workers import compile_units
+from sim.errors import SimError
+from sim.reference.reference import map_poses
+
+TIMES = ((0.35, 0.35), (0.35, 1.0), (1.0, 1.0))
+"""Durations of a change of place and of pace [s]."""
+ANGLES = tuple(np.arange(0.0, 2.0 * np.pi, np.pi / 6.0))
+"""Angles of the lap at which changes begin [rad]."""
+SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Shares of the way from curve to curve at which a hand is held."""
+_BEFORE, _AFTER = 2.5, 4.0  # [s] on the first curve at least, and from the change's beginning to the end
+
+
+def _paces(haptic_map: Lifted, curve: int) -> Callable[[float], float]:
+    """θ̇ of a clip at its own pace [rad/s], as a function of θ."""
+    angles = haptic_map.angles[curve]
+    rates = np.gradient(angles, 1.0 / haptic_map.clips[curve][1])
+    return lambda angle: float(np.interp(angle, angles, rates, period=2.0 * np.pi))
+
+
+def _animation(haptic_map: Lifted, angles: Array, shares: Array, curves: tuple[int, int]) -> Clip:
+    """Animation of a hand at angles (n,) of the lap and shares (n,) of the way from one curve to another."""
+    first, second = (haptic_map.site(i, angles) for i in curves)
+    r, z = (first + shares[:, None] * (second - first)).T
+    points = np.column_stack([r * np.cos(angles), r * np.sin(angles), z])
+    return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "change")
+
+
+def _followed(clip: Clip) -> Verdict:
+    result = followed(clip, clip.duration - 1.0, compile_units)
+    return Verdict(result.residual, np.inf if result.fell is None else result.fell)
+
+
+def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tuple[float, float]) -> Verdict:
+    """How the figure follows a hand that goes from one closed curve to another, begun at an angle [rad].
+
+    Place and pace change along smooth steps of the given durations [s]; needs compiled code.
+    """
+    first, second = (_paces(haptic_map, i) for i in curves)
+    angles, since = [0.0], 0.0
+    shares, started = [0.0], np.inf
+    while since < _AFTER:
+        t, angle = len(angles) / FPS, angles[-1]
+        near = (angle - begin) % (2.0 * np.pi) < first(angle) / FPS
+        started = t if t >= _BEFORE and near and started == np.inf else started
+        since = max(t - started, 0.0)
+        share, pace = smooth_steps(np.array([since / seconds for seconds in times]))
+        angles.append(angle + ((1.0 - pace) * first(angle) + pace * second(angle)) / FPS)
+        shares.append(float(share))
+    return _followed(_animation(haptic_map, np.array(angles), np.array(shares), curves))
+
+
+def held(haptic_map: Lifted, curves: tuple[int, int], share: float, seconds: float = 9.0) -> Verdict:
+    """How the figure follows a hand that is held at a share of the way from one closed curve to another."""
+    first, second = (_paces(haptic_map, i) for i in curves)
+    angles = [0.0]
+    for _ in range(round(seconds * FPS)):
+        angles.append(angles[-1] + ((1.0 - share) * first(angles[-1]) + share * second(angles[-1])) / FPS)
+    return _followed(_animation(haptic_map, np.array(angles), np.full(len(angles), share), curves))
+
+
+def _cell(verdict: Verdict) -> str:
+    return f"falls {verdict.fell:.1f}" if verdict.falls else f"{100 * verdict.residual:.1f}"
+
+
+def main(file: str, first: str, second: str) -> None:
+    """Print the tables of changes in both directions, and of hands held between."""
+    haptic_map, _ = load_figure_map(Path(file))
+    if not isinstance(haptic_map, Lifted):
+        raise SimError(f"{file}: is no lifted map; expected a file that hvf lift wrote")
+    one, other = curve_number(haptic_map, first), curve_number(haptic_map, second)
+    print("Residual [% of weight] or time of the fall [s], by the angle at which the change begins.\n")
+    print("| change | place, pace [s] |", " | ".join(f"{np.degrees(angle):.0f}°" for angle in ANGLES), "|")
+    print("|---" * (2 + len(ANGLES)) + "|")
+    for curves in ((one, other), (other, one)):
+        name = " → ".join(haptic_map.names[i] for i in curves)
+        for times in TIMES:
+            cells = [_cell(changed(haptic_map, curves, angle, times)) for angle in ANGLES]
+            print(f"| {name} | {times[0]:g}, {times[1]:g} |", " | ".join(cells), "|", flush=True)
+    cells = [f"{share:g}: {_cell(held(haptic_map, (one, other), share))}" for share in SHARES]
+    print("\nHeld at shares of the way:", ", ".join(cells))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
