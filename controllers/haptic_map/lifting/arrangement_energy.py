@@ -36,10 +36,10 @@ from geometry.easing import cubic_steps
 N_ROWS = 64  # control points round the lap
 _SAMPLES_PER_ROW = 3
 N_ANGLES = N_ROWS * _SAMPLES_PER_ROW  # angles at which the energy is evaluated
-# Sensitivities of the constants in this file are for walk, run, jump and backflip, with curves that slant and two strides
-# of the walk to three of the run: they pass within 7.7 mm of each other, jump and backflip within 4.4 mm, and h_*
-# changes by at most 74 % of itself per millimetre at nine of ten places (now 8.5, 6.1 mm and 67 %). Those in other files
-# of this folder were found in a room with r from 20 mm on, before arrangements converged.
+# Sensitivities of the constants in this file are for walk, run, jump and backflip, with curves that slant and two
+# strides of the walk to three of the run: they pass within 7.7 mm of each other, jump and backflip within 4.4 mm, and
+# h_* changes by at most 74 % of itself per millimetre at nine of ten places (now 8.5, 6.1 mm and 67 %). Those in other
+# files of this folder were found in a room with r from 20 mm on, before arrangements converged.
 
 # [rad] distance from a transition within which two curves may be nearer than the separation. With half of it the
 # distances are 9.7 and 8.4 mm, with twice 6.2 and 2.6.
