@@ -14,5 +14,5 @@ with tempfile.TemporaryDirectory() as folder:
     sim = hvf.Simulation(field=hvf.Follow(river, k_r=300, b_d=8).limited(3.0), haptic_map=run_map)
     alone = sim.run(4.0)
     print(f"the run alone: residual {100 * alone.summary.figure.residual_force_rms:.1f} % of weight")
-    over = hvf.run(map=str(file), curve="walk", mode="rivers", user="push", seconds=6.0)
+    over = hvf.run(map=str(file), curve="walk", mode="rivers", user="push", seconds=8.0)
     print("\n".join(line for line in str(over).splitlines() if line.startswith("Rivers")))
