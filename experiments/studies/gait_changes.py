@@ -62,15 +62,16 @@ def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tu
     Place and pace change along smooth steps of the given durations [s]; needs compiled code.
     """
     first, second = (_paces(haptic_map, i) for i in curves)
-    angles, since = [0.0], 0.0
-    shares, started = [0.0], np.inf
-    while since < _AFTER:
-        t, angle = len(angles) / FPS, angles[-1]
-        near = (angle - begin) % (2.0 * np.pi) < first(angle) / FPS
-        started = t if t >= _BEFORE and near and started == np.inf else started
-        since = max(t - started, 0.0)
-        share, pace = smooth_steps(np.array([since / seconds for seconds in times]))
-        angles.append(angle + ((1.0 - pace) * first(angle) + pace * second(angle)) / FPS)
+    angles = [0.0]
+    while len(angles) < _BEFORE * FPS:
+        angles.append(angles[-1] + first(angles[-1]) / FPS)
+    begin = angles[-1] + (begin - angles[-1]) % (2.0 * np.pi)
+    while angles[-1] < begin:
+        angles.append(angles[-1] + first(angles[-1]) / FPS)
+    shares = [0.0] * len(angles)
+    for since in np.arange(1, round(_AFTER * FPS) + 1) / FPS:
+        share, pace = smooth_steps(since / np.array(times))
+        angles.append(angles[-1] + ((1.0 - pace) * first(angles[-1]) + pace * second(angles[-1])) / FPS)
         shares.append(float(share))
     return _followed(_animation(haptic_map, np.array(angles), np.array(shares), curves))
 
@@ -94,6 +95,8 @@ def main(file: str, first: str, second: str) -> None:
     if not isinstance(haptic_map, Lifted):
         raise SimError(f"{file}: is no lifted map; expected a file that hvf lift wrote")
     one, other = curve_number(haptic_map, first), curve_number(haptic_map, second)
+    if not (haptic_map.closed[one] and haptic_map.closed[other]):
+        raise SimError(f"{first} and {second}: one of them is open; expected two curves that close, as gaits have")
     print("Residual [% of weight] or time of the fall [s], by the angle at which the change begins.\n")
     print("| change | place, pace [s] |", " | ".join(f"{np.degrees(angle):.0f}°" for angle in ANGLES), "|")
     print("|---" * (2 + len(ANGLES)) + "|")

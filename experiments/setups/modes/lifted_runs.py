@@ -26,12 +26,13 @@ _SPEED_RANGE = (0.5, 2.0)
 # angles, if the pace changes as fast, and at none if it takes a second (`experiments.studies.gait_changes`)
 _EASE_TIME = 1.0
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
-# [s] from the start of a push to the transition: with 0.34 to 0.55 the figure stays up (nine pushes)
+# [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures stay up, on the default
+# layout and its mirror image
 _PUSH_LEAD_TIME = 0.36
 _CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
-# [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 3 mm
-# apart at their transitions; captures are 1.6 m apart at one, where the figure falls.
+# [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 12
+# and 17 mm apart at their transitions; captures are 1.6 m apart at one, where the figure falls.
 _MAX_CARRY_DISTANCE = 0.25
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.

@@ -52,13 +52,19 @@ def test_low_variance_law_holds_on_one_fresh_panel(name: str) -> None:
 @pytest.mark.slow
 def test_device_holds_its_load_though_a_hand_hardly_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     # Without tremor the encoders seemed frozen to the device, which let go of this person after 61 s of a load of 0.25.
+    traces: list[Trace] = []
+
     def first_minute(*given: Any) -> Trace:
         person, wishes, _, seed, start, pushes, end = given
-        return trial(person, wishes, 65.0, seed, start, pushes[: round(65.0 / PERIOD)], end)
+        traces.append(trial(person, wishes, 65.0, seed, start, pushes[: round(65.0 / PERIOD)], end))
+        return traces[-1]
 
     monkeypatch.setattr(practice, "trial", first_minute)
     monkeypatch.setattr(practice, "LOADS", practice.LOADS[:2])
     user_laws(PEOPLE, 3003, ("endurance",))  # raises if the device lets go
+    assert len(traces) == len(practice.LOADS)
+    # Nobody gives way within the first minute, so each trial lasts to its end.
+    assert min(trace.t[-1] for trace in traces) > 64.9
 
 
 @pytest.mark.slow
