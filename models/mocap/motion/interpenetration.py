@@ -1,7 +1,11 @@
 """How deep legs and arms go into each other or into the trunk, by the shapes of the figure that is drawn."""
 
+from functools import cache
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model
@@ -24,26 +28,70 @@ PARTS: tuple[tuple[str, str], ...] = tuple((first, second) for first, second, _ 
 _DRAWN_GROUP = 1  # of the geoms that are drawn; spheres of contact are in another
 
 
+class Overlaps(NamedTuple):
+    """How deep parts of the body are in each other.
+
+    Attributes
+    ----------
+    depths : array, shape (n, len(PARTS))
+        How far the two parts would have to be moved to be apart; 0 where they are [m].
+    gradients : array, shape (n, len(PARTS), 57)
+        Derivatives of the depths in the tangent of the poses [m/m], [m/rad].
+    """
+
+    depths: Array
+    gradients: Array
+
+
 def depths(poses: Array) -> Array:
     """Depth of each of `PARTS` in each other in poses (n, 75), shape (n, len(PARTS)) [m]; 0 where they are apart."""
+    return overlaps(poses, np.full(len(PARTS), np.inf)).depths
+
+
+def overlaps(poses: Array, beyond: Array) -> Overlaps:
+    r"""Depths of `PARTS` in poses (n, 75), and gradients of those that exceed `beyond` (len(PARTS),) [m].
+
+    .. math:: \partial d = n \cdot (J_a(p_a) - J_b(p_b)) \, \delta
+
+    where p_a and p_b are the points of two shapes that are deepest in each other, n the direction from p_b to p_a
+    divided by the depth d, as MuJoCo's `mj_geomDistance` gives them.
+    """
+    model, rows = figure_model(), _pairs()
+    data, ends, jacobians = mujoco.MjData(model), np.empty(6), np.empty((2, 3, model.nv))
+    firsts, seconds = rows[:, 1:].T
+    reach = model.geom_rbound[firsts] + model.geom_rbound[seconds]
+    found = Overlaps(np.zeros((len(poses), len(PARTS))), np.zeros((len(poses), len(PARTS), model.nv)))
+    for k, pose in enumerate(poses):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        near = np.linalg.norm(data.geom_xpos[firsts] - data.geom_xpos[seconds], axis=1) < reach
+        deepest: dict[int, tuple[int, int, Array]] = {}
+        for part, a, b in rows[near].tolist():
+            depth = -mujoco.mj_geomDistance(model, data, a, b, 0.0, ends)
+            if depth > found.depths[k, part]:
+                found.depths[k, part] = depth
+                deepest[part] = a, b, ends.copy()
+        for part, (a, b, points) in deepest.items():
+            depth = found.depths[k, part]
+            if depth <= beyond[part]:
+                continue
+            mujoco.mj_comPos(model, data)
+            for jacobian, geom, point in zip(jacobians, (a, b), points.reshape(2, 3), strict=True):
+                mujoco.mj_jac(model, data, jacobian, None, point, int(model.geom_bodyid[geom]))
+            found.gradients[k, part] = (points[3:] - points[:3]) / depth @ (jacobians[1] - jacobians[0])
+    return found
+
+
+@cache
+def _pairs() -> npt.NDArray[np.intp]:
+    """Index in `PARTS` and the two shapes of every pair that is drawn, shape (n, 3)."""
     model = figure_model()
-    data, ends = mujoco.MjData(model), np.empty(6)
     geoms: dict[str, list[int]] = {}
     for geom in np.flatnonzero(model.geom_group == _DRAWN_GROUP):
         geoms.setdefault(model.body(model.geom_bodyid[geom]).name, []).append(int(geom))
-    rows = [
+    return np.array([
         (k, a, b)
         for k, (_, _, pairs) in enumerate(_PAIRS)
         for first, second in pairs
         for one in first for other in second for a in geoms[one] for b in geoms[other]
-    ]  # fmt: skip
-    parts, firsts, seconds = np.array(rows).T
-    reach = model.geom_rbound[firsts] + model.geom_rbound[seconds]
-    found = np.zeros((len(poses), len(PARTS)))
-    for row, pose in zip(found, poses, strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        near = np.linalg.norm(data.geom_xpos[firsts] - data.geom_xpos[seconds], axis=1) < reach
-        for k, a, b in zip(parts[near], firsts[near], seconds[near], strict=True):
-            row[k] = max(row[k], -mujoco.mj_geomDistance(model, data, a, b, 0.0, ends))
-    return found
+    ])  # fmt: skip

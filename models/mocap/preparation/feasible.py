@@ -8,6 +8,7 @@ squares of
 - the displacement of standing contact spheres from their places (foot skate), with a weight that fades out beside the
   stance, and the depth of the others below the floor;
 - the excess over joint limits (its cost is linear) and joint torques beyond three quarters of their limits;
+- how much deeper limbs are in each other or in the trunk than in the capture;
 - the change itself, and its third derivative.
 
 Feet are planted together with the dynamics: planting them by inverse kinematics alone made tracking worse.
@@ -24,6 +25,7 @@ from geometry.arrays import Array, Mask, rms
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.interpenetration import PARTS, overlaps
 from models.mocap.motion.ranges import vectors_in_ranges
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations
 from models.mocap.preparation.inverse_dynamics import InverseDynamics
@@ -43,6 +45,7 @@ _COST_TOLERANCE, _CONVERGENCE_STEPS = 0.01, 3
 _LINEAR_EXCESS = 0.05
 # Ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1).
 _MIN_DECREASE_RATIO = 0.25
+ANY_OVERLAP = np.full(len(PARTS), np.inf)  # limbs are not kept apart
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
 _ALL = slice(None)
 _TORQUE_END, _WRENCH_END = 3 * len(JOINTS), 3 * len(JOINTS) + 6  # ends of the first blocks of errors: torques, wrench
@@ -64,6 +67,8 @@ class FeasibleWeights:
         Factor on both while no sphere bears load.
     slip, depth : float
         Displacement of a standing sphere, depth of a swinging sphere below its clearance [1/m].
+    overlap : float
+        Depth of a limb in another or in the trunk beyond the capture's [1/m].
     limit : float
         Excess of a rotation vector over its limits [1/rad].
     strain : float
@@ -79,6 +84,7 @@ class FeasibleWeights:
     flight: float = 5.0
     slip: float = 300.0
     depth: float = 600.0
+    overlap: float = 100.0
     limit: float = 100.0
     strain: float = 10.0
     place: float = 1.0
@@ -129,7 +135,7 @@ class _Errors(NamedTuple):
 
     Attributes
     ----------
-    weighted : array, shape (m, 108 + 4k)
+    weighted : array, shape (m, 113 + 4k)
         Weighted errors of the nonlinear terms.
     jacobian : array or None
         Blocks of their Jacobian.
@@ -149,7 +155,12 @@ class _Errors(NamedTuple):
 
 
 def feasible(
-    clip: Clip, schedule: Stances, iterations: int = 24, fps: float = 120.0, passage: bool = False
+    clip: Clip,
+    schedule: Stances,
+    iterations: int = 24,
+    fps: float = 120.0,
+    passage: bool = False,
+    overlap: Array = ANY_OVERLAP,
 ) -> Feasible:
     """Local optimum: the motion nearest to a clip that is feasible with a given contact schedule.
 
@@ -165,9 +176,11 @@ def feasible(
         Frame rate of the result [1/s].
     passage : bool
         Whether the clip is a part of a longer motion that is unchanged beyond its ends.
+    overlap : array, shape (len(PARTS),)
+        How deep each of `interpenetration.PARTS` may be in each other [m].
     """
     change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
-    problem = _Problem(change, schedule)
+    problem = _Problem(change, schedule, overlap)
     x, costs = problem.solve(iterations)
     points = x.reshape(-1, N_TANGENT)
     sizes = change.size(points)
@@ -186,8 +199,8 @@ def feasible(
 class _Problem:
     """The least-squares problem of one clip."""
 
-    def __init__(self, change: Change, schedule: Stances) -> None:
-        self.change, self.w = change, FeasibleWeights()
+    def __init__(self, change: Change, schedule: Stances, overlap: Array = ANY_OVERLAP) -> None:
+        self.change, self.w, self.overlap = change, FeasibleWeights(), overlap
         self.contacts = ALL_CONTACTS[: schedule.standing.shape[1]]
         self.floor = Floor(self.w.moment / self.w.force, self.contacts)
         frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
@@ -264,7 +277,7 @@ class _Problem:
         return block.transpose(0, 2, 1, 3).reshape(size, size), np.einsum("koa,kon->an", basis, slopes).ravel()
 
     def errors(self, x: Array, with_jacobian: bool, instants: npt.NDArray[np.intp] | slice = _ALL) -> _Errors:
-        """Nonlinear errors of a change: torques (51), wrench (6), slip (3k), depth (k), limits (51)."""
+        """Nonlinear errors of a change: torques (51), wrench (6), slip (3k), depth (k), limits (51), overlaps (5)."""
         w, k = self.w, len(self.contacts)
         state = self.change.states(x.reshape(-1, N_TANGENT), instants)
         m = len(state.q)
@@ -288,7 +301,12 @@ class _Problem:
         penalty = excess / magnitude * penalty_root
         torque_ratio = demand.torque_on(grip) / torque_limit()
         strain = torque_ratio - np.clip(torque_ratio, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)
-        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, -1)]
+        overlap = overlaps(state.q, self.overlap) if np.isfinite(self.overlap).any() else None
+        too_deep = np.zeros((m, len(PARTS))) if overlap is None else np.maximum(overlap.depths - self.overlap, 0.0)
+        parts = [
+            w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, -1),
+            w.overlap * too_deep,
+        ]  # fmt: skip
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
             return _Errors(weighted, None, residual, grip, torque_ratio)
@@ -302,6 +320,8 @@ class _Problem:
         for joint in range(len(JOINTS)):
             axes = slice(3 * joint, 3 * joint + 3)
             jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = rates[:, joint]
+        if overlap is not None:
+            jacobian[:, 0, -len(PARTS) :] = w.overlap * overlap.gradients
         return _Errors(weighted, jacobian, residual, grip, torque_ratio)
 
     def _differentiate_forces(

@@ -13,6 +13,7 @@ from models.errors import ModelError
 from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
+from models.mocap.motion.interpenetration import depths
 from models.mocap.motion.kinematics import contact_points
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
@@ -168,7 +169,7 @@ def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> _Attempt:
     planted = without_foot_sliding(cycle.clip, smoothed(cycle.clip))
     smooth = smoothed(planted)
     schedule = with_feet_at_rest(stances(planted, smooth), planted)
-    result = feasible(smooth, schedule, fps=FPS)
+    result = feasible(smooth, schedule, fps=FPS, overlap=depths(captured.poses).max(axis=0))
     near = (
         result.turned < _MAX_ROTATION_CHANGE
         and result.raised < _MAX_HEIGHT_CHANGE
