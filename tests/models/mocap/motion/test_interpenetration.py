@@ -8,7 +8,7 @@ from models.humanoid.skeleton import JOINTS, rest_pose
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.interpenetration import PARTS, depths, overlaps
-from models.mocap.preparation.looping import mirrored
+from models.mocap.motion.mirror import mirrored
 from models.mocap.preparation.poses import add_tangents
 
 

@@ -10,8 +10,9 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.interpenetration import depths
 from models.mocap.motion.kinematics import sole_points
+from models.mocap.motion.mirror import mirrored
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.looping import close_or_rest, mirrored
+from models.mocap.preparation.looping import close_or_rest
 from models.mocap.preparation.poses import add_tangents, resampled
 
 
