@@ -24,7 +24,8 @@ from geometry.arrays import Array
 from geometry.easing import smooth_step
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip
-from models.mocap.preparation.feasible import Feasible, contact_forces, feasible
+from models.mocap.preparation.contact_loads import contact_forces
+from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.stances import Stances, stances
 from sim.compilation.sources import results_folder
 from sim.compilation.workers import run_in_workers

@@ -49,7 +49,7 @@ def motion_of(poses: Array, fps: float) -> Motion:
     """Measure a motion (n, 75)."""
     # Imported here: they load signal processing, which a run with cached results does not need.
     from models.mocap.motion.kinematics import sole_points
-    from models.mocap.preparation.feasible import contact_forces
+    from models.mocap.preparation.contact_loads import contact_forces
     from models.mocap.preparation.poses import smoothed
     from models.mocap.preparation.skate import skates
     from models.mocap.preparation.stances import stances

@@ -18,7 +18,7 @@ from geometry.arrays import Array
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, joint_range, torque_limit
 from models.mocap.dynamics.floor_forces import Floor, RequiredWrench, residual
-from models.mocap.preparation.feasible import JOINT_LIMIT_MARGIN
+from models.mocap.preparation.motion_errors import JOINT_LIMIT_MARGIN
 from models.mocap.preparation.stances import LOAD_DELAY
 from tools.clip_authoring.coordinates import states
 

@@ -1,108 +1,28 @@
 r"""Trajectory optimisation of a capture: the nearest motion that contact forces and joint torques alone can produce.
 
 Gauss–Newton over the whole motion minimises, over the change δ(t) of `change`, the sum over sampled instants of the
-squares of
-
-- the residual wrench at the centre of mass, r = w − A f*, with f* the contact forces that best produce the required
-  wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
-- the displacement of standing contact spheres from their places (foot skate), with a weight that fades out beside the
-  stance, and the depth of the others below the floor;
-- the excess over joint limits (its cost is linear) and joint torques beyond three quarters of their limits;
-- how much deeper limbs are in each other or in the trunk than in the capture;
-- the change itself, and its third derivative.
+squares of the errors of `motion_errors`, of the change itself, and of its third derivative.
 
 Feet are planted together with the dynamics: planting them by inverse kinematics alone made tracking worse.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from geometry import quaternions
 from geometry.arrays import Array, Mask, rms
-from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
-from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
+from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip
-from models.mocap.motion.interpenetration import PARTS, overlaps
-from models.mocap.motion.ranges import vectors_in_ranges
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations
-from models.mocap.preparation.inverse_dynamics import InverseDynamics
-from models.mocap.preparation.stances import Stances, clearance
+from models.mocap.preparation.motion_errors import ANY_OVERLAP, DYNAMIC_COUNT, Errors, MotionErrors
+from models.mocap.preparation.stances import Stances
 
-JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
-_STRAIN_THRESHOLD = 0.75  # fraction of the torque limits beyond which torque is penalised
-# Spacing of knots and of sampled instants [s]. With 80 and 20 ms preparation takes half the time, but the figure falls
-# in a run.
-_KNOT_SPACING, _INSTANT_SPACING = 0.05, 0.0125
 # Iteration ends when the last 3 steps together lower the cost by less than 1 %.
 _COST_TOLERANCE, _CONVERGENCE_STEPS = 0.01, 3
-# Excess [rad] over a joint's range from which its cost is linear, an exact penalty (Nocedal & Wright 2006, ch. 17).
-# If it is squared throughout, a captured ankle 100° beyond its range outweighs all other errors, and spinkick has a
-# residual of 3.5 % of body weight instead of 2.3 %. With 0.1 the figure falls in snu/backflip; with 0.03 a wrist in a
-# later capture exceeds its range by 67° for a moment.
-_LINEAR_EXCESS = 0.05
 # Ratio of actual to predicted decrease below which damping grows (Nocedal & Wright 2006, alg. 4.1).
 _MIN_DECREASE_RATIO = 0.25
-ANY_OVERLAP = np.full(len(PARTS), np.inf)  # limbs are not kept apart
 _CHUNK = 64  # knot intervals whose Jacobians are in memory together: 50 MB
-_ALL = slice(None)
-_TORQUE_END, _WRENCH_END = 3 * len(JOINTS), 3 * len(JOINTS) + 6  # ends of the first blocks of errors: torques, wrench
-
-
-@dataclass(frozen=True)
-class FeasibleWeights:
-    """Weights of the errors before squaring, per sampled instant.
-
-    Chosen on three walks and a run of the tuning half (`docs/validation/preparation-choices.md`). The jerk's weight
-    matters: with a smaller one, two walks need 21 and 9 % of body weight instead of 7 and 5 %; with 5e-5 the figure
-    stays up in the run.
-
-    Parameters
-    ----------
-    force, moment : float
-        Residual force, per body weight; residual moment, per body weight × metre.
-    flight : float
-        Factor on both while no sphere bears load.
-    slip, depth : float
-        Displacement of a standing sphere, depth of a swinging sphere below its clearance [1/m].
-    overlap : float
-        Depth of a limb in another or in the trunk beyond the capture's [1/m].
-    limit : float
-        Excess of a rotation vector over its limits [1/rad].
-    strain : float
-        Excess of a joint torque over three quarters of its limit, as a fraction of the limit.
-    place, root, spine, head, arm, leg, ankle : float
-        Change of the root's position [1/m], and of rotations [1/rad].
-    sway, jerk : float
-        Third derivative of the change of the root's position [s³/m] and of rotations [s³/rad].
-    """
-
-    force: float = 20.0
-    moment: float = 40.0
-    flight: float = 5.0
-    slip: float = 300.0
-    depth: float = 600.0
-    overlap: float = 100.0
-    limit: float = 100.0
-    strain: float = 10.0
-    place: float = 1.0
-    root: float = 8.0
-    spine: float = 6.0
-    head: float = 8.0
-    arm: float = 4.0
-    leg: float = 3.0
-    ankle: float = 2.0
-    sway: float = 3e-3
-    jerk: float = 3e-4
-
-    def tracking(self) -> Array:
-        """Weights of the change, shape (57,)."""
-        kinds = {"abdomen": self.spine, "chest": self.spine, "head": self.head}
-        parts = {"hip": self.leg, "knee": self.leg, "ankle": self.ankle}
-        joints = [kinds.get(joint) or parts.get(joint.split("_")[-1]) or self.arm for joint in JOINTS]
-        return np.repeat([self.place, self.root, *joints], 3)
 
 
 class Feasible(NamedTuple):
@@ -130,30 +50,6 @@ class Feasible(NamedTuple):
     costs: tuple[float, ...]
 
 
-class _Errors(NamedTuple):
-    """Errors of m instants.
-
-    Attributes
-    ----------
-    weighted : array, shape (m, 113 + 4k)
-        Weighted errors of the nonlinear terms.
-    jacobian : array or None
-        Blocks of their Jacobian.
-    residual : array, shape (m, 6)
-        Residual wrench [N], [N m].
-    grip : array, shape (m, 4k)
-        Contact forces along the edges of the friction pyramids [N].
-    torque_ratio : array, shape (m, 51)
-        Joint torques as fractions of their limits.
-    """
-
-    weighted: Array
-    jacobian: Array | None
-    residual: Array
-    grip: Array
-    torque_ratio: Array
-
-
 def feasible(
     clip: Clip,
     schedule: Stances,
@@ -179,13 +75,13 @@ def feasible(
     overlap : array, shape (len(PARTS),)
         How deep each of `interpenetration.PARTS` may be in each other [m].
     """
-    change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
-    problem = _Problem(change, schedule, overlap)
-    x, costs = problem.solve(iterations)
+    change = Change(clip, passage=passage)
+    errors = MotionErrors(change, schedule, overlap)
+    x, costs = _Problem(change, errors).solve(iterations)
     points = x.reshape(-1, N_TANGENT)
     sizes = change.size(points)
     turns = np.linalg.norm(sizes[:, 6:].reshape(len(sizes), -1, 3), axis=2)
-    force = np.linalg.norm(problem.errors(x, False).residual[:, :3], axis=1) / problem.floor.body_weight
+    force = np.linalg.norm(errors.at(x, False).residual[:, :3], axis=1) / errors.floor.body_weight
     return Feasible(
         change.changed(points, fps),
         rms(force),
@@ -197,22 +93,13 @@ def feasible(
 
 
 class _Problem:
-    """The least-squares problem of one clip."""
+    """The least-squares problem of one clip: errors, and quadratic costs of the change."""
 
-    def __init__(self, change: Change, schedule: Stances, overlap: Array = ANY_OVERLAP) -> None:
-        self.change, self.w, self.overlap = change, FeasibleWeights(), overlap
-        self.contacts = ALL_CONTACTS[: schedule.standing.shape[1]]
-        self.floor = Floor(self.w.moment / self.w.force, self.contacts)
-        frames = np.minimum(np.round(change.times * change.clip.fps).astype(int), len(schedule.standing) - 1)
-        self.pushing, self.places = schedule.pushing[frames], schedule.places[frames]
-        self.grounded = (schedule.standing | schedule.sliding)[frames]
-        self.pinned = np.repeat(schedule.kept[frames][:, :, None], 3, axis=2)
-        self.pinned[:, :, 2] = self.grounded
-        self.clearance = clearance(schedule, change.clip.fps, change.closed)[frames]
-        self.low, self.high = joint_range()[..., 0] + JOINT_LIMIT_MARGIN, joint_range()[..., 1] - JOINT_LIMIT_MARGIN
+    def __init__(self, change: Change, errors: MotionErrors) -> None:
+        self.change, self.errors = change, errors
         self.fixed = NormalEquations(change)
-        tracking = self.w.tracking() ** 2
-        smoothness = np.where(np.arange(N_TANGENT) < 3, self.w.sway, self.w.jerk) ** 2
+        tracking = errors.w.tracking() ** 2
+        smoothness = np.where(np.arange(N_TANGENT) < 3, errors.w.sway, errors.w.jerk) ** 2
         for interval in range(change.intervals):
             inside = np.flatnonzero(change.first == interval)
             blocks = [
@@ -220,19 +107,19 @@ class _Problem:
             ]
             self.fixed.add(interval, np.kron(blocks[0], np.diag(tracking)) + np.kron(blocks[1], np.diag(smoothness)))
 
-    def cost(self, errors: _Errors, x: Array) -> float:
+    def cost(self, errors: Errors, x: Array) -> float:
         return float(np.sum(errors.weighted**2) + x @ self.fixed.times(x))
 
     def solve(self, iterations: int) -> tuple[Array, list[float]]:
         """Levenberg–Marquardt from δ = 0, until `_CONVERGENCE_STEPS` lower the cost by `_COST_TOLERANCE` at most."""
         x = np.zeros(self.change.n_points * N_TANGENT)
         damping = 1e-4
-        costs = [self.cost(self.errors(x, False), x)]
+        costs = [self.cost(self.errors.at(x, False), x)]
         for _ in range(iterations):
             system, g = self._linearise(x)
             for _ in range(12):
                 step = system.solve(g, damping)
-                if (cost := self.cost(self.errors(x - step, False), x - step)) < costs[-1]:
+                if (cost := self.cost(self.errors.at(x - step, False), x - step)) < costs[-1]:
                     break
                 damping = max(8.0 * damping, 1e-4)
             else:
@@ -253,13 +140,13 @@ class _Problem:
         for start in range(0, change.intervals, _CHUNK):
             intervals = range(start, min(start + _CHUNK, change.intervals))
             instants = np.flatnonzero((change.first >= intervals.start) & (change.first < intervals.stop))
-            errors = self.errors(x, True, instants)
+            errors = self.errors.at(x, True, instants)
             for interval in intervals:
                 block, parts[interval] = self._block(errors, instants, change.first[instants] == interval)
                 system.add(interval, block)
         return system, system.gradient(parts) + self.fixed.times(x)
 
-    def _block(self, errors: _Errors, instants: npt.NDArray[np.intp], in_interval: Mask) -> tuple[Array, Array]:
+    def _block(self, errors: Errors, instants: npt.NDArray[np.intp], in_interval: Mask) -> tuple[Array, Array]:
         """JᵀJ and Jᵀe for the six control points of an interval, summed over its instants.
 
         With J = Σ_o b_o ⊗ J_o over the orders o of δ's derivatives, JᵀJ = Σ_op (b_o b_pᵀ) ⊗ (J_oᵀ J_p).
@@ -267,118 +154,11 @@ class _Problem:
         assert errors.jacobian is not None
         jacobian, weighted = errors.jacobian[in_interval], errors.weighted[in_interval]
         basis = np.stack([self.change.basis[order][instants[in_interval]] for order in range(3)], axis=1)
-        dynamic = jacobian[:, :, :_WRENCH_END]  # only torques and wrench depend on velocity and acceleration
+        dynamic = jacobian[:, :, :DYNAMIC_COUNT]  # only torques and wrench depend on velocity and acceleration
         inner = dynamic.transpose(0, 1, 3, 2)[:, :, None] @ dynamic[:, None]
-        inner[:, 0, 0] += jacobian[:, 0, _WRENCH_END:].transpose(0, 2, 1) @ jacobian[:, 0, _WRENCH_END:]
+        inner[:, 0, 0] += jacobian[:, 0, DYNAMIC_COUNT:].transpose(0, 2, 1) @ jacobian[:, 0, DYNAMIC_COUNT:]
         pairs = np.einsum("koa,kpb->abkop", basis, basis).reshape((DEGREE + 1) ** 2, -1)
         block = (pairs @ inner.reshape(-1, N_TANGENT**2)).reshape(DEGREE + 1, DEGREE + 1, N_TANGENT, N_TANGENT)
         size = (DEGREE + 1) * N_TANGENT
         slopes = (weighted[:, None, None] @ jacobian)[:, :, 0]
         return block.transpose(0, 2, 1, 3).reshape(size, size), np.einsum("koa,kon->an", basis, slopes).ravel()
-
-    def errors(self, x: Array, with_jacobian: bool, instants: npt.NDArray[np.intp] | slice = _ALL) -> _Errors:
-        """Nonlinear errors of a change: torques (51), wrench (6), slip (3k), depth (k), limits (51), overlaps (5)."""
-        w, k = self.w, len(self.contacts)
-        state = self.change.states(x.reshape(-1, N_TANGENT), instants)
-        m = len(state.q)
-        pushing, grounded, pinned = self.pushing[instants], self.grounded[instants], self.pinned[instants]
-        dynamics = InverseDynamics(state, with_jacobian, self.contacts)
-        demand = dynamics.demand
-        grip = self.floor.grip(demand, pushing)
-        residual = demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)
-        weight = self.floor.body_weight
-        scale = np.where(pushing.any(axis=1), 1.0, w.flight)[:, None] / weight
-        scale = scale * np.repeat([w.force, w.moment], 3)
-        slip = w.slip * pinned * (demand.spheres - self.places[instants])
-        depth = (
-            w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance[instants], 0.0) * ~grounded
-        )
-        vectors = vectors_in_ranges(state.q[:, 7:].reshape(m, -1, 4), self.low, self.high)
-        excess = vectors - np.clip(vectors, self.low, self.high)
-        magnitude = np.maximum(np.abs(excess), _LINEAR_EXCESS)
-        # The penalty's square is 2 e |excess| - e² beyond e = _LINEAR_EXCESS.
-        penalty_root = np.sqrt(2.0 * _LINEAR_EXCESS * magnitude - _LINEAR_EXCESS**2)
-        penalty = excess / magnitude * penalty_root
-        torque_ratio = demand.torque_on(grip) / torque_limit()
-        strain = torque_ratio - np.clip(torque_ratio, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)
-        overlap = overlaps(state.q, self.overlap) if np.isfinite(self.overlap).any() else None
-        too_deep = np.zeros((m, len(PARTS))) if overlap is None else np.maximum(overlap.depths - self.overlap, 0.0)
-        parts = [
-            w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, -1),
-            w.overlap * too_deep,
-        ]  # fmt: skip
-        weighted = np.concatenate(parts, axis=1)
-        if not with_jacobian:
-            return _Errors(weighted, None, residual, grip, torque_ratio)
-        jacobian = np.zeros((m, 3, weighted.shape[1], N_TANGENT))
-        self._differentiate_forces(jacobian, dynamics, grip, scale, strain)
-        slips, depths = slice(_WRENCH_END, _WRENCH_END + 3 * k), slice(_WRENCH_END + 3 * k, _WRENCH_END + 4 * k)
-        jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
-        jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        slope = w.limit * _LINEAR_EXCESS / penalty_root * (excess != 0)
-        rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
-        for joint in range(len(JOINTS)):
-            axes = slice(3 * joint, 3 * joint + 3)
-            jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = rates[:, joint]
-        if overlap is not None:
-            jacobian[:, 0, -len(PARTS) :] = w.overlap * overlap.gradients
-        return _Errors(weighted, jacobian, residual, grip, torque_ratio)
-
-    def _differentiate_forces(
-        self, jacobian: Array, dynamics: InverseDynamics, grip: Array, scale: Array, strain: Array
-    ) -> None:
-        """Write the rows of torques and residual wrench; `Floor.answer` gives how contact forces follow the wrench."""
-        demand, wrench_rows = dynamics.demand, dynamics.wrench
-        force_gain = self.floor.answer(demand, grip)
-        projection = np.eye(6) - demand.columns() @ force_gain
-        forces = grip.reshape(len(grip), -1, 4) @ EDGES
-        arms = np.zeros((len(grip), 6, N_TANGENT))
-        for sphere in range(len(self.contacts)):
-            # Moments of the contact forces change with their lever arms.
-            arms[:, 3:] -= quaternions.cross_matrix(forces[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
-        wrench_rows[:, 0] -= arms
-        jacobian[:, :, _TORQUE_END:_WRENCH_END] = scale[:, None, :, None] * np.einsum(
-            "mij,mojn->moin", projection, wrench_rows
-        )
-        strained = np.flatnonzero(np.any(strain != 0, axis=1))
-        if len(strained):
-            gain = self.w.strain * (strain[strained] != 0) / torque_limit()
-            force_response = demand.levers()[strained] @ force_gain[strained]
-            torque = dynamics.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
-            torque[:, 0] -= dynamics.torque_by_contact_force(forces, strained)
-            jacobian[strained, :, :_TORQUE_END] = gain[:, None, :, None] * torque
-
-
-class ContactForces(NamedTuple):
-    """Contact forces of a clip, the force that they leave, and the largest joint torque.
-
-    Attributes
-    ----------
-    residual : float
-        RMS residual force [body weights].
-    loads : array, shape (n, k)
-        Vertical force on each contact sphere, frame by frame [body weights].
-    strain : float
-        Largest torque of a joint, as a fraction of its limit.
-    joint : str
-        The joint with this torque.
-    """
-
-    residual: float
-    loads: Array
-    strain: float
-    joint: str
-
-
-def contact_forces(clip: Clip, schedule: Stances, passage: bool = False) -> ContactForces:
-    """Contact forces of a clip as it is, for a contact schedule; `passage` as in `feasible`."""
-    change = Change(clip, _KNOT_SPACING, _INSTANT_SPACING, passage)
-    problem = _Problem(change, schedule)
-    errors = problem.errors(np.zeros(change.n_points * N_TANGENT), False)
-    weight = problem.floor.body_weight
-    forces = (errors.grip.reshape(len(errors.grip), -1, 4) @ EDGES)[:, :, 2] / weight
-    frames = np.arange(clip.n_frames) / clip.fps
-    loads = np.column_stack([np.interp(frames, change.times, force) for force in forces.T])
-    torque_ratios = np.abs(errors.torque_ratio).max(axis=0)
-    residual = rms(np.linalg.norm(errors.residual[:, :3], axis=1)) / weight
-    return ContactForces(residual, loads, float(torque_ratios.max()), JOINTS[int(torque_ratios.argmax()) // 3])

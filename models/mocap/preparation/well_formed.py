@@ -30,7 +30,7 @@ from models.mocap.preparation.bounds import (
     MIN_SOLE_HEIGHT,
     exceeding_text,
 )
-from models.mocap.preparation.feasible import ContactForces, contact_forces
+from models.mocap.preparation.contact_loads import ContactForces, contact_forces
 from models.mocap.preparation.poses import extend_periodically, resampled, smoothed
 from models.mocap.preparation.skate import MAX_REST_SPEED, loaded_slide, moving_points, skates
 from models.mocap.preparation.stances import stances

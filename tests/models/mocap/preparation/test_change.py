@@ -4,9 +4,10 @@ import pytest
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation import feasible
+from models.mocap.preparation import feasible, motion_errors
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations
 from models.mocap.preparation.feasible import _Problem
+from models.mocap.preparation.motion_errors import MotionErrors
 from models.mocap.preparation.poses import add_tangents, resampled, smoothed
 from models.mocap.preparation.stances import stances
 
@@ -69,7 +70,7 @@ def test_change_of_a_passage_vanishes_to_second_order_at_its_ends():
 
 def test_normal_equations_by_chunks_equal_those_of_all_intervals_at_once(change, monkeypatch):
     """Chunks of knot intervals, so that memory need not hold all Jacobians, give the same normal equations."""
-    problem = _Problem(change, stances(change.clip, change.clip))
+    problem = _Problem(change, MotionErrors(change, stances(change.clip, change.clip)))
     x = 1e-3 * np.random.default_rng(4).normal(size=change.n_points * N_TANGENT)
     whole, g = problem._linearise(x)
     monkeypatch.setattr(feasible, "_CHUNK", 3)
@@ -104,22 +105,22 @@ def test_banded_normal_equations_match_the_stacked_rows(change):
 def test_error_jacobian_matches_central_differences(change, monkeypatch):
     """Differences along random changes; the step is so small that contacts keep their active edges."""
     monkeypatch.setattr(
-        feasible, "_STRAIN_THRESHOLD", 0.02
+        motion_errors, "_STRAIN_THRESHOLD", 0.02
     )  # so low that most torques contribute, also those of standing legs
     clip = change.clip
-    problem = _Problem(change, stances(clip, smoothed(clip)))
+    problem = MotionErrors(change, stances(clip, smoothed(clip)))
     # Narrow ranges, so that bent joints exceed them about all axes, where rotation vectors change nonlinearly.
     problem.low, problem.high = 0.05 * problem.low, 0.05 * problem.high
     rng = np.random.default_rng(3)
     x = 1e-3 * rng.normal(size=change.n_points * N_TANGENT)
-    errors = problem.errors(x, True)
+    errors = problem.at(x, True)
     direction = rng.normal(size=x.shape)
     which = change.first[:, None] + np.arange(DEGREE + 1)
     points = change.points(direction.reshape(-1, N_TANGENT))
     parts = np.stack([np.einsum("mk,mkn->mn", change.basis[order], points[which]) for order in range(3)], axis=1)
     analytic = np.einsum("mofn,mon->mf", errors.jacobian, parts)
     step = 1e-6
-    ahead, behind = (problem.errors(x + sign * step * direction, False).weighted for sign in (1, -1))
+    ahead, behind = (problem.at(x + sign * step * direction, False).weighted for sign in (1, -1))
     numeric = (ahead - behind) / (2 * step)
     # The two ends of an open motion take the velocities of their neighbours.
     inner = slice(1, -1) if not (change.closed or change.passage) else slice(None)

@@ -18,10 +18,11 @@ from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, resid
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points
-from models.mocap.preparation import feasible
+from models.mocap.preparation import motion_errors
 from models.mocap.preparation.change import DEGREE, Change
-from models.mocap.preparation.feasible import _Problem, contact_forces
+from models.mocap.preparation.contact_loads import contact_forces
 from models.mocap.preparation.hand_stances import extend_hand_stances
+from models.mocap.preparation.motion_errors import MotionErrors
 from models.mocap.preparation.stances import stances
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.preparation.push_up import PALMS, held, propped
@@ -138,18 +139,18 @@ def test_hand_stance_is_extended_where_nothing_else_bears_load():
 
 def test_error_jacobian_with_loaded_hands_matches_central_differences(monkeypatch):
     """Differences along a random change, with a torque bound so low that arms and trunk contribute."""
-    monkeypatch.setattr(feasible, "_STRAIN_THRESHOLD", 0.02)
+    monkeypatch.setattr(motion_errors, "_STRAIN_THRESHOLD", 0.02)
     arms = np.deg2rad(85.0) - 0.15 * np.sin(np.linspace(0.0, np.pi, 40)) ** 2
     clip = Clip(np.array([pose_of(propped(angle)) for angle in arms]), 60.0, "push-up")
     schedule, change = stances(clip, clip), Change(clip, 0.1, 0.05, passage=True)
     assert schedule.hands.all()
-    problem, rng = _Problem(change, schedule), np.random.default_rng(6)
+    problem, rng = MotionErrors(change, schedule), np.random.default_rng(6)
     x, direction = 1e-3 * rng.normal(size=(2, change.n_points * N_TANGENT)) * ((1.0,), (1e3,))
-    errors = problem.errors(x, True)
+    errors = problem.at(x, True)
     assert (errors.grip[:, 4 * PALMS.start :].sum(axis=1) > 0.1 * problem.floor.body_weight).all()
     points = change.points(direction.reshape(-1, N_TANGENT))[change.first[:, None] + np.arange(DEGREE + 1)]
     parts = np.stack([np.einsum("mk,mkn->mn", change.basis[order], points) for order in range(3)], axis=1)
     analytic = np.einsum("mofn,mon->mf", errors.jacobian, parts)
-    ahead, behind = (problem.errors(x + sign * 1e-6 * direction, False).weighted for sign in (1, -1))
+    ahead, behind = (problem.at(x + sign * 1e-6 * direction, False).weighted for sign in (1, -1))
     numeric = (ahead - behind) / 2e-6
     assert np.quantile(np.abs(analytic - numeric) / (np.abs(numeric).max(axis=0) + 1.0), 0.99) < 0.02

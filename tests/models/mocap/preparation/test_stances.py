@@ -7,7 +7,7 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import sole_points
-from models.mocap.preparation.feasible import contact_forces
+from models.mocap.preparation.contact_loads import contact_forces
 from models.mocap.preparation.poses import resampled
 from models.mocap.preparation.stances import stances, with_feet_at_rest
 
