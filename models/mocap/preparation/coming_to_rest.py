@@ -1,6 +1,5 @@
 r"""Coming to rest at an end of an open clip: by a decay of its velocities, or by a last step of a walking body."""
 
-from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -10,10 +9,8 @@ from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.motion.clip import pose_difference
-from models.mocap.motion.interpenetration import PARTS, depths
 from models.mocap.motion.kinematics import global_rotations, sole_points
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import MAX_ADDED_DEPTH
 from models.mocap.preparation.poses import add_tangents
 
 # Time in which limbs come to rest at an end [s]: if it is longer, they exceed their joint limits. For the root it grows
@@ -30,11 +27,6 @@ _STOP_TIME = 0.9
 _STEP_FLEXION = np.deg2rad(30.0)
 # How far a joint may exceed its range as it comes to rest [rad], and how often its time is halved, down to 0.01 s.
 _RANGE_TOLERANCE, _MAX_HALVINGS = np.deg2rad(1.0), 6
-_LIMB_JOINTS = {
-    f"{side} {limb}": [6 + 3 * JOINTS.index(f"{side}_{joint}") + axis for joint in joints for axis in range(3)]
-    for side in ("left", "right")
-    for limb, joints in (("arm", ("clavicle", "shoulder", "elbow", "wrist")), ("leg", ("hip", "knee", "ankle")))
-}  # components of a velocity (57,)
 
 Ending = Literal["step", "decay", "limited decay"]
 
@@ -42,38 +34,22 @@ Ending = Literal["step", "decay", "limited decay"]
 def come_to_rest(pose: Array, velocity: Array, fps: float, ending: Ending) -> Array:
     """Poses in which a velocity decays as (1 − x)² (1 + 2x), x = t/T, while the soles come down to the floor.
 
-    T grows with the root's speed for the root only: with a longer T, limbs would exceed their joint limits. Limbs that
-    would go into each other or into the trunk get half of T, a quarter, …. So does, in a limited decay, a joint that
-    would still leave its range, as by noise in a first frame. A walking body takes a last step instead, if the ending
-    is a step.
+    T grows with the root's speed for the root only: with a longer T, limbs would exceed their joint limits. In a
+    limited decay a joint that would still leave its range, as by noise in a first frame, gets half of T, a quarter, ….
+    A walking body takes a last step instead, if the ending is a step.
     """
     if ending == "step" and _walks(pose, velocity):
-        times = np.full(len(velocity), REST_TIME)
-        return _kept_apart(lambda times: _step_to_stand(pose, velocity, times, fps), times, pose)
+        return _step_to_stand(pose, velocity, fps)
     longest = np.minimum(REST_TIME + _REST_TIME_PER_SPEED * float(np.linalg.norm(velocity[:2])), _MAX_REST_TIME)
     times = np.repeat((longest, REST_TIME), (3, len(velocity) - 3))
     allowed = np.maximum(beyond_ranges(pose[None])[0], 0.0) + _RANGE_TOLERANCE
     for _ in range(_MAX_HALVINGS if ending == "limited decay" else 0):
         times[6:] /= 1.0 + np.repeat(beyond_ranges(_decay(pose, velocity, times, fps)).max(axis=0) > allowed, 3)
-    poses = _kept_apart(lambda times: _decay(pose, velocity, times, fps), times, pose)
+    poses = _decay(pose, velocity, times, fps)
     x = np.arange(1, len(poses) + 1) / (fps * longest)
     low = sole_points(poses)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     poses[:, 2] -= smooth_steps(x) * low
     return poses
-
-
-def _kept_apart(poses_of: Callable[[Array], Array], times: Array, pose: Array) -> Array:
-    """Poses that decay from a pose over times (57,) [s]; those of limbs that go deeper into others are halved."""
-    most, times = depths(pose[None])[0] + MAX_ADDED_DEPTH, times.copy()
-    for _ in range(_MAX_HALVINGS):
-        poses = poses_of(times)
-        deep = np.flatnonzero(depths(poses).max(axis=0) > most)
-        limbs = {limb for k in deep for limb in PARTS[k]} & set(_LIMB_JOINTS)
-        if not limbs:
-            return poses
-        for limb in limbs:
-            times[_LIMB_JOINTS[limb]] /= 2.0
-    return poses_of(times)
 
 
 def _decay(pose: Array, velocity: Array, times: Array, fps: float) -> Array:
@@ -96,7 +72,7 @@ def _walks(pose: Array, velocity: Array) -> bool:
     return bool(speed > _MIN_WALKING_SPEED and upright > _MIN_WALKING_COSINE and height < _MAX_SUPPORT_HEIGHT)
 
 
-def _step_to_stand(pose: Array, velocity: Array, times: Array, fps: float) -> Array:
+def _step_to_stand(pose: Array, velocity: Array, fps: float) -> Array:
     r"""Poses in which a walking body stands still on its lower foot and puts the other one beside it.
 
     Pelvis, spine and legs go from their rotations q₀ to those q₁ of standing, with the velocity at first:
@@ -104,8 +80,7 @@ def _step_to_stand(pose: Array, velocity: Array, times: Array, fps: float) -> Ar
     .. math:: q(t) = q_0 \exp(S(x) \log(q_0^{-1} q_1) + T\,(x - 6x^3 + 8x^4 - 3x^5)\,\omega), \quad x = t/T
 
     with the smooth step S. The hip and twice as much the knee of the stepping leg bend between. The lower foot carries
-    the root, but for the difference of its velocity, which decays likewise. Head and arms come to rest by themselves,
-    over `times` (57,) [s].
+    the root, but for the difference of its velocity, which decays likewise. Head and arms come to rest by themselves.
     """
     n = round(_STOP_TIME * fps)
     x = np.arange(1, n + 1)[:, None] / n
@@ -118,7 +93,7 @@ def _step_to_stand(pose: Array, velocity: Array, times: Array, fps: float) -> Ar
             standing[7 + 4 * k : 11 + 4 * k] = 1.0, 0.0, 0.0, 0.0
             rows[6 + 3 * k : 9 + 3 * k] = True
     drift = departing(x) * _STOP_TIME
-    decay = _decayed(np.arange(1, n + 1) / fps, times) * velocity
+    decay = _decayed(np.arange(1, n + 1) / fps, np.full(len(velocity), REST_TIME)) * velocity
     tangents = np.where(rows, smooth_steps(x) * pose_difference(pose, standing) + drift * velocity, decay)
     tangents[:, :3] = 0.0
     soles = sole_points(pose[None])[0].reshape(2, 4, 3)

@@ -5,10 +5,9 @@ import pytest
 
 from geometry import quaternions
 from models.errors import ModelError
-from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, rest_pose
+from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
-from models.mocap.motion.interpenetration import depths
 from models.mocap.motion.kinematics import sole_points
 from models.mocap.motion.mirror import mirrored
 from models.mocap.motion.ranges import beyond_ranges
@@ -194,24 +193,6 @@ def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
     captured_excess = max(beyond_ranges(poses).max(), 0.0)
     assert excess[0] > captured_excess + np.deg2rad(20.0)
     assert excess[1] < captured_excess + np.deg2rad(1.01)
-
-
-@pytest.mark.parametrize(("ending", "speed"), [("decay", 0.0), ("step", 0.6)])
-def test_arm_that_moves_towards_the_trunk_comes_to_rest_outside_of_it(ending, speed):
-    """A forearm that turns in at 6 rad/s would go 9 cm deep; the body stands, or walks and takes a last step."""
-    n = 60
-    poses = np.repeat(rest_pose()[None], n, axis=0)
-    poses[:, 0] += speed * np.arange(n) / 120.0
-    shoulder, elbow = (slice(7 + 4 * k, 11 + 4 * k) for k in map(JOINTS.index, ("left_shoulder", "left_elbow")))
-    lowered, turns = quaternions.about_axis(0, np.deg2rad(-80.0)), np.deg2rad(np.linspace(-135.0, 35.0, n))
-    poses[:, shoulder] = quaternions.product(lowered, quaternions.about_axis(1, turns))
-    poses[:, elbow] = quaternions.about_axis(2, np.deg2rad(-90.0))
-    assert depths(poses).max() == 0.0
-    thrown = add_tangents(poses[-1:], np.eye(57)[None, 6 + 3 * JOINTS.index("left_shoulder") + 1] * np.deg2rad(60.0))
-    assert depths(thrown).max() > 0.09
-    found = close_or_rest(Clip(poses, 120.0, "turned in"), "open", ending=ending).clip
-    assert found.n_frames > n + 60
-    assert depths(found.poses).max() < 0.021
 
 
 def test_clip_that_ends_in_the_air_comes_to_rest_on_the_floor():
