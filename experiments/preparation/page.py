@@ -52,6 +52,7 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
         f'<p>{verdict} {escape(outcome.followed.line().capitalize())}.</p><div class="wide"><table>'
         f"<tr><th></th><th>captured</th><th>prepared</th></tr>{rows}</table></div>"
         + listed("What was changed", changes(prepared))
+        + listed("Joints that differ most from the capture", tuple(e.line() for e in prepared.fidelity.extremes))
         + listed(
             "What is not within bounds, not certified, or not in the clip",
             (*outcome.faults(), *outcome.doubts, *outcome.advice()),

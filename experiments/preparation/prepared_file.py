@@ -87,15 +87,15 @@ class PreparedFile(NamedTuple):
 
 
 def summary(outcome: PreparedFile) -> tuple[str, ...]:
-    """Lines for the terminal: what was done and whether the clip is well-formed; below, faults, doubts and advice."""
+    """Lines for the terminal: whether the clip is well-formed and what was done; below, faults, doubts and advice."""
     prepared, flights = outcome.prepared, outcome.flights
     if len(flights) > _MAX_NAMED + 1:
         flights = (*flights[:_MAX_NAMED], f"{len(flights) - _MAX_NAMED} more flights are refuted, as the report lists")
     faults = outcome._replace(flights=flights).faults()
     return (
-        f"{prepared.clip.name}: {'; '.join(changes(prepared))}; "
+        f"{prepared.clip.name}: {'not ' if faults else ''}well-formed; {'; '.join(changes(prepared))}; "
         f"contact leaves a residual of {100 * outcome.measures.residual:.1f} % of weight; {outcome.followed.line()}; "
-        f"{prepared.seconds:.0f} s of processor time; " + ("not well-formed" if faults else "well-formed"),
+        f"{prepared.seconds:.0f} s of processor time",
         *(f"  {line}" for line in (*faults, *outcome.doubts, *outcome.advice())),
     )
 

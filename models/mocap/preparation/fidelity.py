@@ -41,6 +41,10 @@ class WorstJoint(NamedTuple):
     angle: float
     when: float
 
+    def line(self) -> str:
+        """The measure in words."""
+        return f"{self.joint} {np.rad2deg(self.angle):.0f}° at {self.when:.2f} s"
+
 
 class Intrusion(NamedTuple):
     """Where one part of the body is deepest in another.
@@ -99,11 +103,10 @@ class Fidelity(NamedTuple):
         return tuple(found)
 
     def line(self) -> str:
-        """The measures in words."""
-        far = ", ".join(f"{e.joint} {np.rad2deg(e.angle):.0f}° at {e.when:.2f} s" for e in self.extremes)
+        """The measures in words, with the joint that differs most."""
         return (
             f"from the capture joints are {np.rad2deg(self.joints):.1f}°, the root {100 * self.root:.1f} cm RMS; "
-            f"at most {far}"
+            f"at most {self.extremes[0].line()}"
         )
 
 

@@ -111,7 +111,7 @@ def test_lines_are_in_the_order_of_importance(near):
     far = result.fidelity._replace(joints=0.2)
     outcome = PreparedFile(result._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
     first, *below = str(outcome).splitlines()
-    assert first.endswith("; not well-formed")
+    assert first.startswith(f"{result.clip.name}: not well-formed; ")
     starts = [
         "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
         "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
@@ -127,6 +127,6 @@ def test_a_well_formed_clip_has_one_line_and_what_it_lacks():
     result = _made(None, near=True)
     outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01, None, 20.0, 1.0), (), ())
     first, lost = str(outcome).splitlines()
-    assert first.endswith("; well-formed")
+    assert first.startswith(f"{result.clip.name}: well-formed; ")
     assert lost.endswith(": --loop open keeps its turns")
     assert not outcome.faults()
