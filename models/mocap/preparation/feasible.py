@@ -15,7 +15,7 @@ from geometry.arrays import Array, Mask, rms
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations
-from models.mocap.preparation.motion_errors import ANY_OVERLAP, DYNAMIC_COUNT, Errors, MotionErrors
+from models.mocap.preparation.motion_errors import DYNAMIC_COUNT, Errors, MotionErrors
 from models.mocap.preparation.stances import Stances
 
 # Iteration ends when the last 3 steps together lower the cost by less than 1 %.
@@ -56,7 +56,7 @@ def feasible(
     iterations: int = 24,
     fps: float = 120.0,
     passage: bool = False,
-    overlap: Array = ANY_OVERLAP,
+    overlap: Array | None = None,
 ) -> Feasible:
     """Local optimum: the motion nearest to a clip that is feasible with a given contact schedule.
 
@@ -72,8 +72,8 @@ def feasible(
         Frame rate of the result [1/s].
     passage : bool
         Whether the clip is a part of a longer motion that is unchanged beyond its ends.
-    overlap : array, shape (len(PARTS),)
-        How deep each of `interpenetration.PARTS` may be in each other [m].
+    overlap : array, shape (5,), or None
+        How deep each of `interpenetration.PARTS` may be in each other [m]; None if limbs are not kept apart.
     """
     change = Change(clip, passage=passage)
     errors = MotionErrors(change, schedule, overlap)

@@ -33,7 +33,6 @@ _STRAIN_THRESHOLD = 0.75  # fraction of the torque limits beyond which torque is
 # residual of 3.5 % of body weight instead of 2.3 %. With 0.1 the figure falls in snu/backflip; with 0.03 a wrist in a
 # later capture exceeds its range by 67° for a moment.
 _LINEAR_EXCESS = 0.05
-ANY_OVERLAP = np.full(len(PARTS), np.inf)  # limbs are not kept apart
 _ALL = slice(None)
 _TORQUE_COUNT = 3 * len(JOINTS)
 DYNAMIC_COUNT = _TORQUE_COUNT + 6  # number of the first errors, torques and wrench, that depend on velocities
@@ -98,7 +97,7 @@ class Errors(NamedTuple):
 
     Attributes
     ----------
-    weighted : array, shape (m, 113 + 4k)
+    weighted : array, shape (m, 108 + 4k), or (m, 113 + 4k) if limbs are kept apart
         Weighted errors of the nonlinear terms.
     jacobian : array or None
         Blocks of their Jacobian.
@@ -117,6 +116,13 @@ class Errors(NamedTuple):
     torque_ratio: Array
 
 
+class _LimitErrors(NamedTuple):
+    """Weighted errors of joints beyond their ranges, (m, 51), and their derivatives by each rotation, (m, 17, 3, 3)."""
+
+    weighted: Array
+    rates: Array
+
+
 class MotionErrors:
     """Errors of a changed clip by which it differs from a feasible motion.
 
@@ -126,11 +132,11 @@ class MotionErrors:
         Change of the clip.
     schedule : Stances
         Its contact schedule, frame by frame.
-    overlap : array, shape (len(PARTS),)
-        How deep each of `interpenetration.PARTS` may be in each other [m].
+    overlap : array, shape (5,), or None
+        How deep each of `interpenetration.PARTS` may be in each other [m]; None if limbs are not kept apart.
     """
 
-    def __init__(self, change: Change, schedule: Stances, overlap: Array = ANY_OVERLAP) -> None:
+    def __init__(self, change: Change, schedule: Stances, overlap: Array | None = None) -> None:
         self.change, self.w, self.overlap = change, FeasibleWeights(), overlap
         self.contacts = ALL_CONTACTS[: schedule.standing.shape[1]]
         self.floor = Floor(self.w.moment / self.w.force, self.contacts)
@@ -159,20 +165,14 @@ class MotionErrors:
         depth = (
             w.depth * np.minimum(demand.spheres[:, :, 2] - CONTACT_RADIUS - self.clearance[instants], 0.0) * ~grounded
         )
-        vectors = vectors_in_ranges(state.q[:, 7:].reshape(m, -1, 4), self.low, self.high)
-        excess = vectors - np.clip(vectors, self.low, self.high)
-        magnitude = np.maximum(np.abs(excess), _LINEAR_EXCESS)
-        # The penalty's square is 2 e |excess| - e² beyond e = _LINEAR_EXCESS.
-        penalty_root = np.sqrt(2.0 * _LINEAR_EXCESS * magnitude - _LINEAR_EXCESS**2)
-        penalty = excess / magnitude * penalty_root
+        limits = self._limit_errors(state.q)
         torque_ratio = demand.torque_on(grip) / torque_limit()
         strain = torque_ratio - np.clip(torque_ratio, -_STRAIN_THRESHOLD, _STRAIN_THRESHOLD)
-        overlap = overlaps(state.q, self.overlap) if np.isfinite(self.overlap).any() else None
-        too_deep = np.zeros((m, len(PARTS))) if overlap is None else np.maximum(overlap.depths - self.overlap, 0.0)
-        parts = [
-            w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, w.limit * penalty.reshape(m, -1),
-            w.overlap * too_deep,
-        ]  # fmt: skip
+        parts = [w.strain * strain, scale * residual, slip.reshape(m, 3 * k), depth, limits.weighted]
+        overlap = None
+        if self.overlap is not None:
+            overlap = overlaps(state.q, self.overlap)
+            parts.append(w.overlap * np.maximum(overlap.depths - self.overlap, 0.0))
         weighted = np.concatenate(parts, axis=1)
         if not with_jacobian:
             return Errors(weighted, None, residual, grip, torque_ratio)
@@ -181,14 +181,24 @@ class MotionErrors:
         slips, depths = slice(DYNAMIC_COUNT, DYNAMIC_COUNT + 3 * k), slice(DYNAMIC_COUNT + 3 * k, DYNAMIC_COUNT + 4 * k)
         jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
         jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * dynamics.spheres[:, :, 2]
-        slope = w.limit * _LINEAR_EXCESS / penalty_root * (excess != 0)
-        rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
         for joint in range(len(JOINTS)):
             axes = slice(3 * joint, 3 * joint + 3)
-            jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = rates[:, joint]
+            jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = limits.rates[:, joint]
         if overlap is not None:
             jacobian[:, 0, -len(PARTS) :] = w.overlap * overlap.gradients
         return Errors(weighted, jacobian, residual, grip, torque_ratio)
+
+    def _limit_errors(self, q: Array) -> _LimitErrors:
+        """Errors of joints beyond their ranges, in poses (m, 75)."""
+        vectors = vectors_in_ranges(q[:, 7:].reshape(len(q), -1, 4), self.low, self.high)
+        excess = vectors - np.clip(vectors, self.low, self.high)
+        magnitude = np.maximum(np.abs(excess), _LINEAR_EXCESS)
+        # The penalty's square is 2 e |excess| - e² beyond e = _LINEAR_EXCESS.
+        penalty_root = np.sqrt(2.0 * _LINEAR_EXCESS * magnitude - _LINEAR_EXCESS**2)
+        penalty = excess / magnitude * penalty_root
+        slope = self.w.limit * _LINEAR_EXCESS / penalty_root * (excess != 0)
+        rates = slope[..., None] * quaternions.logarithm_derivative(vectors)
+        return _LimitErrors(self.w.limit * penalty.reshape(len(q), -1), rates)
 
     def _differentiate_forces(
         self, jacobian: Array, dynamics: InverseDynamics, grip: Array, scale: Array, strain: Array
