@@ -34,7 +34,6 @@ from models.mocap.preparation.poses import add_tangents
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 from sim.loop.channels import groups, record_into
-from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 from sim.viewer.live_stage import LiveStage
 from sim.viewer.shown import Moment, courses
@@ -109,13 +108,13 @@ def _processor_time(seconds: float, recorded: bool) -> float:
     with tempfile.TemporaryDirectory() as folder:
         if not recorded:
             begin = time.process_time()
-            Loop(session.servo, session.world).run(seconds)
+            session.loop().run(seconds)
             return time.process_time() - begin
         with Recorder(
             Path(folder) / "run.h5", {}, 1, groups(session.servo, session.world), session.static()
         ) as recorder:
             begin = time.process_time()
-            Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(seconds)
+            session.loop(record_into(recorder, session.servo, session.world)).run(seconds)
             recorder.flush()
             return time.process_time() - begin
 
