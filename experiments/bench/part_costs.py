@@ -1,7 +1,5 @@
 """Costs of parts: a tick of the heaviest field, the recorder, an image of the live page, preparing captures."""
 
-import contextlib
-import io
 import tempfile
 import time
 from pathlib import Path
@@ -9,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import psutil
-import viser
 from numba import njit
 from scipy.ndimage import gaussian_filter1d
 
@@ -34,9 +31,9 @@ from models.mocap.preparation.poses import add_tangents
 from models.mocap.preparation.prepare import prepared
 from models.mocap.readers.own_bvh import write_bvh
 from sim.loop.channels import groups, record_into
-from sim.loop.loop import Loop
 from sim.recording.recorder import Recorder
 from sim.viewer.live_stage import LiveStage
+from sim.viewer.replay_page import unserved
 from sim.viewer.shown import Moment, courses
 
 _CLIPS = ("walk", "run", "jump", "squat_dance")  # gaits, a flight, and a dance in place
@@ -109,13 +106,13 @@ def _processor_time(seconds: float, recorded: bool) -> float:
     with tempfile.TemporaryDirectory() as folder:
         if not recorded:
             begin = time.process_time()
-            Loop(session.servo, session.world).run(seconds)
+            session.loop().run(seconds)
             return time.process_time() - begin
         with Recorder(
             Path(folder) / "run.h5", {}, 1, groups(session.servo, session.world), session.static()
         ) as recorder:
             begin = time.process_time()
-            Loop(session.servo, session.world, record_into(recorder, session.servo, session.world)).run(seconds)
+            session.loop(record_into(recorder, session.servo, session.world)).run(seconds)
             recorder.flush()
             return time.process_time() - begin
 
@@ -126,9 +123,7 @@ N_IMAGES, N_WARM_UP_IMAGES = 200, 20  # images that are timed, and drawn before 
 def picture_microseconds(session: Session) -> float:
     """Processor time of an image in which every body has moved [µs], without connected browsers."""
     model, data = session.world.full_model(), session.world.data
-    with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
+    with unserved() as server:
         stage = LiveStage(server.scene, model, courses(session.static()), 0.01)
         rng = np.random.default_rng(1)
         qpos = data.qpos[: model.nq] + 0.05 * rng.normal(size=(2, model.nq))
@@ -143,9 +138,6 @@ def picture_microseconds(session: Session) -> float:
                 stage.show(Moment(0.016 * k, qpos[moment], pose[moment], place, 1.0 + place, 1.0 - place, place))
                 stage.draw_slice(forces[moment], forces[moment])
         return 1e6 * (time.thread_time() - begin) / N_IMAGES
-    finally:
-        with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
 
 
 def prepare_cost() -> tuple[float, float]:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import FROM_WORST, Outcome, hash_of, without_laws
+from controllers.certificates.report import FROM_WORST, Outcome, Verdict, hash_of, without_laws
 from controllers.errors import ControllerError
 from experiments.certify.certified_field import certificate_inputs
 from experiments.config.run_config import RunConfig
@@ -61,17 +61,21 @@ def cached_stability(config: RunConfig) -> Stability:
     return found
 
 
-def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
+def stability_of_laws(config: RunConfig, hands: HandRange) -> dict[str, Verdict]:
+    """Verdicts on the stability of a run's laws, by their names in `certified_laws`; raises as `certified_rivers`."""
     from controllers.certificates.loop.governed import governed_stability  # imported late: loads CasADi
     from experiments.certify.certify import certified_rivers
 
+    drag, missing = governor_drag(config), uncertified_parts(config)
+    verdicts = {name: governed_stability(it, drag, hands.hands()) for name, it in certified_rivers(config).items()}
+    return {name: without_laws(it, missing) for name, it in verdicts.items()} if missing else verdicts
+
+
+def _certify_stability(config: RunConfig, hands: HandRange) -> Stability:
     try:
-        rivers, drag, missing = certified_rivers(config), governor_drag(config), uncertified_parts(config)
-        verdicts = [governed_stability(river, drag, hands.hands()) for river in rivers.values()]
+        verdicts = stability_of_laws(config, hands).values()
     except ControllerError as error:
         return Stability("unknown", None, str(error))
-    if missing:
-        verdicts = [without_laws(verdict, missing) for verdict in verdicts]
     worst = min(verdicts, key=lambda verdict: FROM_WORST.index(verdict.verdict))
     margin = min((verdict.margin for verdict in verdicts if verdict.margin is not None), default=None)
     return Stability(worst.verdict, margin, worst.reason)

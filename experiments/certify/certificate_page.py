@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.stability import River, boundary
 from controllers.certificates.report import Certificate, Verdict
+from experiments.files.html_page import html_page
 from experiments.flights.ballistics import ClipBallistics
 from geometry.physics import GRAVITY
 
@@ -190,12 +191,7 @@ def _name(axes: Axes, title: str, legend: Any = "best") -> None:
 
 def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
     """The HTML page of a certificate; `plots` maps picture files beside it to their captions."""
-    parts = [
-        "<!doctype html><meta charset='utf-8'><title>Certificate</title>",
-        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:52rem;margin:2rem auto;padding:0 1rem;color:#222}"
-        "td{padding:.1rem .8rem .1rem 0;vertical-align:top}img{width:100%}small{color:#666}</style>",
-        f"<h1>Certificate</h1><p><small>inputs {escape(certificate.inputs)}</small></p>",
-    ]
+    parts = [f'<p class="note">inputs {escape(certificate.inputs)}</p>']
     for name, verdict in certificate.verdicts.items():
         margin = "" if verdict.margin is None else f" <small>margin {verdict.margin:.4g}</small>"
         parts.append(
@@ -206,7 +202,7 @@ def certificate_page(certificate: Certificate, plots: Mapping[str, str]) -> str:
         if verdict.counterexample:
             parts.append(f"<p>Counterexample:</p>{_table(verdict.counterexample)}")
     parts += [f"<img src='{escape(file)}' alt='{escape(shows)}'>" for file, shows in plots.items()]
-    return "\n".join(parts)
+    return html_page("Certificate", "\n".join(parts), "td { vertical-align: top; } small { color: #566072; }\n")
 
 
 def _table(numbers: Mapping[str, object]) -> str:

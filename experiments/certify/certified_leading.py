@@ -8,7 +8,6 @@ from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.leading_law import Regime, walking
 from controllers.certificates.loop.passivity import passivity
-from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.certificates.report import FROM_WORST, Verdict
@@ -140,7 +139,6 @@ def _walker_radius(
     river = leading_river(field, regime, curve, device, sampling)
     settings, radii = field.walking, list[float]()
     for hand in hands.hands():
-        loop = SampledLoop(river.still(hand), sampling)
-        matrices = walking(loop, regime, settings.scale, settings.rate, field.k_l, field.b)
+        matrices = walking(river.loop(hand), regime, settings.scale, settings.rate, field.k_l, field.b)
         radii.append(np.abs(np.linalg.eigvals(matrices)).max())
     return float(max(radii))

@@ -11,7 +11,6 @@ import numpy as np
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import HandImpedance, HandRange
 from controllers.certificates.loop.laws import FOLLOW_LAW
-from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, stability
 from controllers.certificates.report import Verdict
@@ -76,7 +75,7 @@ def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, cross
         river = rivers[number]
         here = rivers[place.own].curve.point(place.phase)
         near = int(np.argmin(np.linalg.norm(river.curve.point(river.phases()) - here, axis=1)))
-        loop = SampledLoop(river.still(hand), river.sampling)
+        loop = river.loop(hand)
         free = loop.matrices(0.0, 0.0)[near]
         feedback.append(loop.matrices(river.k_r, river.b_d)[near] - free)
         maps.append(free)

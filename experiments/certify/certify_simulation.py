@@ -13,7 +13,6 @@ from controllers.certificates.loop.hand import HandImpedance, HandRange
 from controllers.certificates.loop.law_cases import Cases, certified_cases, executed
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, follow_law
 from controllers.certificates.loop.passivity import passivity
-from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River
 from controllers.certificates.loop.symbolic_execution import NotExecutable
@@ -261,7 +260,7 @@ def _first_without_common(
         river._replace(law=with_damper(river.law, drag, river.k_r, river.b_d)) for river in rivers if drag > 0.0
     ]
     for hand in hands:
-        loops = [SampledLoop(river.still(hand), river.sampling) for river in (*rivers, *governed)]
+        loops = [river.loop(hand) for river in (*rivers, *governed)]
         maps = np.stack([loop.frozen(rivers[0].k_r, rivers[0].b_d) for loop in loops], axis=1)
         last: Array | None = None
         for phase, phase_maps, basis in zip(rivers[0].phases().tolist(), maps, loops[0].across[0], strict=True):

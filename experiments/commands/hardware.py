@@ -1,14 +1,15 @@
 """``hvf hardware``: real devices from the command line."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from experiments.config.options import config_of_options
 from experiments.config.part import above, part
-from experiments.files.json_text import json_text
-from experiments.hardware.run_options import CalibrateHardware, IdentifyHardware, RunHardware
+from experiments.console.output import Json, say
+from experiments.hardware.run_options import EMULATED, RunHardware
 
 
 @dataclass(frozen=True)
@@ -23,14 +24,12 @@ class ListDevices:
         from sim.devices.hardware_list import list_devices
 
         devices = list_devices()
-        if self.json:
-            print(json_text([asdict(device) for device in devices]))
-            return 0
-        for device in devices:
-            print(f"{device.name or '-':24} {device.where()}")
-            print(f"{'':24} {device.maker_and_product()}: {device.note}")
-        if not devices:
-            print("no device found; `hvf hardware doctor` says what may be missing")
+        lines = [
+            line for device in devices for line in (
+                f"{device.name or '-':24} {device.where()}", f"{'':24} {device.maker_and_product()}: {device.note}"
+            )
+        ]  # fmt: skip
+        say(devices, self.json, lines or ["no device found; `hvf hardware doctor` says what may be missing"])
         return 0
 
 
@@ -60,20 +59,12 @@ class Doctor:
                 identity, link = driver.identity, measured_link(driver, self.seconds)
             finally:
                 driver.close()
-        if self.json:
-            output = {
-                "devices": [asdict(device) for device in devices], "findings": [asdict(finding) for finding in checks],
-                "lateness": lateness._asdict(), "device": identity and identity._asdict(),
-                "link": link and link._asdict(),
-            }  # fmt: skip
-            print(json_text(output))
-            return 0
+        lines = list[str]()
         for device in devices:
-            print(f"device   {device.name or '-'}: {device.where()}")
-            print(f"{'':9}{device.maker_and_product()}: {device.note}")
-        for finding in checks:
-            print("\n".join(finding.lines()))
-        print(
+            lines += [f"device   {device.name or '-'}: {device.where()}"]
+            lines += [f"{'':9}{device.maker_and_product()}: {device.note}"]
+        lines += [line for finding in checks for line in finding.lines()]
+        lines.append(
             f"timing   a loop of 1 kHz, {lateness.loops} times: late by {lateness.p50 * 1e6:.0f} µs (p50), "
             f"{lateness.p99 * 1e6:.0f} (p99), {lateness.p999 * 1e6:.0f} (p99.9), {lateness.worst * 1e6:.0f} at worst; "
             f"{lateness.missed} deadlines missed"
@@ -81,9 +72,10 @@ class Doctor:
         if identity is not None and link is not None:
             watchdog = "; no motors" if not identity.forces else "" if identity.watchdog else "; no watchdog"
             calibrated = "" if identity.calibrated else "; not calibrated"
-            print(f"link     {identity.name} {identity.serial} ({identity.transport}){watchdog}{calibrated}")
-            for line in link.lines():
-                print(f"{'':9}{line}")
+            lines.append(f"link     {identity.name} {identity.serial} ({identity.transport}){watchdog}{calibrated}")
+            lines += [f"{'':9}{line}" for line in link.lines()]
+        found = {"devices": devices, "findings": checks, "lateness": lateness, "device": identity, "link": link}
+        say(found, self.json, lines)
         return 0
 
 
@@ -99,25 +91,51 @@ class RunDevice(RunHardware):
 
 
 @part
-class CalibrateDevice(CalibrateHardware):
+class CalibrateDevice:
     """Measure the encoders' zero while the stylus is at a known pose, and save it in a device file."""
+
+    name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
+    """A device as `hvf hardware list` names it, or "emulated"."""
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The joint angles θ1, θ2, θ3 at which the stylus is held, in a fixture or at its reset pose [rad]."""
+    seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
+    """How long it is read, an hour at most [s]."""
+    out: Path = Path("device.json")
+    """Device file to write; friction, inertia and delay in an existing one are kept."""
+    overwrite: bool = False
+    """Replace the offset that the file has."""
+    emulate: Path | None = None
+    """Device file that the emulated device obeys."""
+    json: Json = False
+    """Print the file's content instead of a table."""
 
     def __call__(self) -> int:
         """Calibrate."""
         from experiments.hardware.calibrate import calibrate
 
-        return calibrate(self)
+        calibrate(self.name, self.pose, self.seconds, self.out, self.overwrite, self.emulate, self.json)
+        return 0
 
 
 @part
-class IdentifyDevice(IdentifyHardware):
+class IdentifyDevice:
     """Identify friction, inertia, delay and encoder offset of a device from recordings with no hand on the stylus."""
+
+    runs: tyro.conf.Positional[tuple[Path, ...]]
+    """Folders of `hvf hardware run`, or their recordings; several fast and slow ones identify more than one."""
+    out: Path = Path("device.json")
+    """Device file to write."""
+    overwrite: bool = False
+    """Replace the file if it exists."""
+    json: Json = False
+    """Print the file's content instead of a table."""
 
     def __call__(self) -> int:
         """Identify."""
         from experiments.hardware.identify import identify
 
-        return identify(self)
+        identify(self.runs, self.out, self.overwrite, self.json)
+        return 0
 
 
 Which = (

@@ -85,7 +85,7 @@ def check_meaning(options: RunHardware) -> None:
         if name in given:
             option = f"--{name.replace('_', '-')} {given[name]}"
             raise ParameterError(f"{option} has no meaning on a device: {reasons[name]}")
-    check_emulate(options)
+    check_emulate(options.name, options.emulate)
     if options.name == EMULATED and options.certificate is None and options.delay > 0.0:
         raise ParameterError(
             f"--delay {options.delay:g} has no meaning without --certificate: it is the delay that was certified; the "

@@ -1,12 +1,13 @@
 """``hvf hardware calibrate``: zero offsets of the encoders, from readings of a stylus held at a known pose."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 
+from experiments.console.output import say
 from experiments.files.device_files import calibrated_json, linkage_from, read_device_file, save_device
-from experiments.files.json_text import json_text
-from experiments.hardware.run_options import EMULATED, CalibrateHardware, check_emulate
+from experiments.hardware.run_options import EMULATED, check_emulate
 from geometry.arrays import Array
 from models.humanoid.skeleton import rest_pose
 from models.phantom.kinematics import ENCODER_STEP, forward_kinematics, vector_to_hand_frame, within_limits
@@ -23,8 +24,13 @@ MAX_REST_MOTION = 5e-3
 _PERIOD = 1e-3  # s
 
 
-def calibrate(options: CalibrateHardware) -> int:
+def calibrate(
+    name: str, pose: tuple[float, float, float], seconds: float, out: Path, overwrite: bool, emulate: Path | None,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Read a device at a known pose with its motors off, print its zero offsets, and write them.
+
+    The arguments are the options of ``hvf hardware calibrate``.
 
     Raises
     ------
@@ -32,36 +38,29 @@ def calibrate(options: CalibrateHardware) -> int:
         If the pose is beyond the joint limits, there is no such device, it moves or gives no readings, or the file
         already has a calibration.
     """
-    if not within_limits(options.pose):
+    if not within_limits(pose):
         raise SimError(
-            f"--pose {' '.join(f'{angle:g}' for angle in options.pose)} is beyond the joints' stops; expected three "
+            f"--pose {' '.join(f'{angle:g}' for angle in pose)} is beyond the joints' stops; expected three "
             "angles [rad] at which a Phantom can stand, such as 0 0 0"
         )
-    check_emulate(options)
-    base = read_device_file(options.out) if options.out.exists() else {}
-    if "offset" in base and not options.overwrite:
-        raise SimError(
-            f"{options.out}: already has an encoder offset; choose another --out, or --overwrite that offset"
-        )
-    emulated_linkage = linkage_from(read_device_file(options.emulate) if options.emulate else {})
-    driver = Fixture(options.pose, emulated_linkage) if options.name == EMULATED else open_device(options.name)
+    check_emulate(name, emulate)
+    base = read_device_file(out) if out.exists() else {}
+    if "offset" in base and not overwrite:
+        raise SimError(f"{out}: already has an encoder offset; choose another --out, or --overwrite that offset")
+    emulated_linkage = linkage_from(read_device_file(emulate) if emulate else {})
+    driver = Fixture(pose, emulated_linkage) if name == EMULATED else open_device(name)
     try:
-        readings = still_readings(driver, options.seconds)
+        readings = still_readings(driver, seconds)
     finally:
         driver.close()
-    offset = readings.mean(axis=0) - np.array(options.pose)
+    offset = readings.mean(axis=0) - np.array(pose)
     # Half an encoder count, or half the range of the readings if that is larger.
     margin = 0.5 * np.maximum(np.array(ENCODER_STEP), np.ptp(readings, axis=0))
     content = calibrated_json(offset.tolist(), margin.tolist(), driver.identity, base)
-    save_device(content, options.out)
-    if options.json:
-        print(json_text(content))
-        return 0
-    for i, (value, half_width) in enumerate(zip(offset, margin, strict=True), start=1):
-        print(f"offset{i}  {value: .5f} ± {half_width:.5f} rad")
+    save_device(content, out)
+    lines = [f"offset{i + 1}  {offset[i]: .5f} ± {margin[i]:.5f} rad" for i in range(3)]
     device = f"{driver.identity.name} {driver.identity.serial}".rstrip()
-    print(f"{device}: {len(readings)} readings; in {options.out}.")
-    return 0
+    say(content, as_json, [*lines, f"{device}: {len(readings)} readings; in {out}."])
 
 
 def still_readings(driver: Driver, seconds: float) -> Array:

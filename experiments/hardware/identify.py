@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from controllers.safety.arming import State
+from experiments.console.output import say
 from experiments.files.device_files import identified_json, read_device_file, save_device
-from experiments.files.json_text import json_text
-from experiments.hardware.run_options import IdentifyHardware
 from experiments.results.folder import DEVICE, RECORDING, is_device_recording
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, IdentificationResult, Motion, identify_linkage, motions_of
@@ -20,25 +19,26 @@ _SETTLING_TIME = 2.5
 _UNITS = {"coulomb": "N m", "viscous": "N m s/rad", "inertia": "kg m²", "delay": "s", "offset": "rad", "weight": "N m"}
 
 
-def identify(options: IdentifyHardware) -> int:
+def identify(runs: Sequence[Path], out: Path, overwrite: bool, as_json: bool) -> None:
     """Identify the parameters of a device, print them, and write its device file.
+
+    The arguments are the options of ``hvf hardware identify``.
 
     Raises
     ------
     SimError
         If a recording is not of a hardware run or has too little motion, or the file exists.
     """
-    if options.out.exists() and not options.overwrite:
-        raise SimError(f"{options.out}: exists; choose another --out, or --overwrite it")
-    if not options.runs:
+    if out.exists() and not overwrite:
+        raise SimError(f"{out}: exists; choose another --out, or --overwrite it")
+    if not runs:
         raise SimError("no recording is given; expected folders of hvf hardware run")
-    base = device_of_runs(options.runs)
-    motions = [motion for path in options.runs for motion in recorded_motions(path)]
+    base = device_of_runs(runs)
+    motions = [motion for path in runs for motion in recorded_motions(path)]
     found = identify_linkage(motions)
-    content = identified_json(found, [str(path) for path in options.runs], base)
-    save_device(content, options.out)
-    print(json_text(content) if options.json else "\n".join(lines_of(found, motions)))
-    return 0
+    content = identified_json(found, [str(path) for path in runs], base)
+    save_device(content, out)
+    say(content, as_json, lines_of(found, motions))
 
 
 def device_of_runs(runs: Sequence[Path]) -> dict[str, Any]:

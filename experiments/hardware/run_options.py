@@ -1,4 +1,4 @@
-"""Options of ``hvf hardware run``, ``calibrate`` and ``identify``; few imports, so that ``hvf`` starts quickly."""
+"""Options of ``hvf hardware run``; few imports, so that ``hvf`` starts quickly."""
 
 from pathlib import Path
 from typing import Annotated
@@ -55,41 +55,7 @@ class RunHardware:
     """Print the outcome as JSON."""
 
 
-@part
-class CalibrateHardware:
-    """Which device stands at which pose, and where its zero is written."""
-
-    name: Annotated[str, tyro.conf.arg(name="device")] = EMULATED
-    """A device as `hvf hardware list` names it, or "emulated"."""
-    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The joint angles θ1, θ2, θ3 at which the stylus is held, in a fixture or at its reset pose [rad]."""
-    seconds: Annotated[float, above(0.0, unit="s", most=3600.0)] = 1.0
-    """How long it is read, an hour at most [s]."""
-    out: Path = Path("device.json")
-    """Device file to write; friction, inertia and delay in an existing one are kept."""
-    overwrite: bool = False
-    """Replace the offset that the file has."""
-    emulate: Path | None = None
-    """Device file that the emulated device obeys."""
-    json: Json = False
-    """Print the file's content instead of a table."""
-
-
-@part
-class IdentifyHardware:
-    """From which recordings a device is identified, and where that is written."""
-
-    runs: tyro.conf.Positional[tuple[Path, ...]]
-    """Folders of `hvf hardware run`, or their recordings; several fast and slow ones identify more than one."""
-    out: Path = Path("device.json")
-    """Device file to write."""
-    overwrite: bool = False
-    """Replace the file if it exists."""
-    json: Json = False
-    """Print the file's content instead of a table."""
-
-
-def check_emulate(options: RunHardware | CalibrateHardware) -> None:
+def check_emulate(name: str, emulate: Path | None) -> None:
     """Refuse a device file for the emulated device if another device is used.
 
     Raises
@@ -97,6 +63,7 @@ def check_emulate(options: RunHardware | CalibrateHardware) -> None:
     ParameterError
         If it is given.
     """
-    if options.name != EMULATED and options.emulate is not None:
-        what = f"--emulate {options.emulate} has no meaning with --device {options.name}"
-        raise ParameterError(f"{what}; it belongs to --device {EMULATED}")
+    if name != EMULATED and emulate is not None:
+        raise ParameterError(
+            f"--emulate {emulate} has no meaning with --device {name}; it belongs to --device {EMULATED}"
+        )

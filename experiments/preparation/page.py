@@ -1,12 +1,9 @@
 """The page of a prepared capture: measures before and after, what was changed, pictures and a replay of both."""
 
-import contextlib
-import io
 from html import escape
 
 import mujoco
 import numpy as np
-import viser
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,6 +15,7 @@ from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import view_offsets
+from sim.viewer.replay_page import page_of, unserved
 from sim.viewer.shapes import body_shapes
 
 _COLOURS = {"left": "#c2473b", "right": "#2f6db3"}
@@ -25,8 +23,6 @@ _PICTURE_COUNT = 14  # number of pictures in a row, evenly over the clip
 _PICTURE_SPACING = 1.0  # distance between two pictures [m]
 _REPLAY_FPS = 30.0  # [1/s]
 _MAX_DURATION = 12.0  # longest replay [s]; cyclic clips are repeated for as long
-# The only notification a replay can give is that the browser renders in software.
-_PAGE_STYLE = "<style>.mantine-Notifications-root {display: none}</style>"
 _SIDE_OFFSET = 0.6  # distance of each figure from the middle [m]
 
 
@@ -117,10 +113,7 @@ def both_html(captured: Clip, prepared: Clip) -> str:
     times = np.arange(int(min(longest, _MAX_DURATION) * _REPLAY_FPS) + 1) / _REPLAY_FPS
     model = figure_model()
     data = mujoco.MjData(model)
-    quiet = io.StringIO()  # viser prints its address and its shutdown, which have no meaning here
-    with contextlib.redirect_stdout(quiet):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
+    with unserved() as server, server.atomic():
         scene, shapes = server.scene, body_shapes(model, "")
         figures: list[tuple[Actor, Array, Array, Array]] = []
         for name, clip, side, colour in (("captured", captured, 1.0, GHOST), ("prepared", prepared, -1.0, "")):
@@ -142,7 +135,4 @@ def both_html(captured: Clip, prepared: Clip) -> str:
                 actor.pose(data, np.append(shifts[k], 0.0), 1.0, aside)
             floor.position = -np.append(figures[1][2][k], 0.0) % 1.0 * np.array([1.0, 1.0, 0.0])
             serializer.insert_sleep(1.0 / _REPLAY_FPS)
-        return serializer.as_html().replace("</head>", _PAGE_STYLE + "</head>", 1)
-    finally:
-        with contextlib.redirect_stdout(quiet):
-            server.stop()
+        return page_of(serializer)

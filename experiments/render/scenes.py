@@ -17,7 +17,7 @@ from sim.recording.recording import Recording
 from sim.viewer.framing import typical_peak
 from sim.viewer.palette import FIELD, USER
 
-_GEOM = mujoco.mjtGeom
+_MAX_HEIGHT = 100.0  # [m] farther than any figure is from the floor
 
 
 def seen_geoms(model: mujoco.MjModel, prefix: str) -> tuple[int, ...]:
@@ -30,34 +30,9 @@ def seen_geoms(model: mujoco.MjModel, prefix: str) -> tuple[int, ...]:
 
 
 def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int]) -> float:
-    r"""Smallest height of the geoms' surfaces [m], after `mj_kinematics`.
-
-    .. math:: z - h(R^T e_z), \quad h(d) = \max_{x} d \cdot x \text{ over the geom about its own centre}
-
-    with h = r for a sphere, r + ℓ|d_z| for a capsule, ‖s d‖ for an ellipsoid, Σ sᵢ|dᵢ| for a box, r√(1−d_z²) + ℓ|d_z|
-    for a cylinder.
-    """
-    return min(float(data.geom_xpos[g][2]) - _support(model, g, data.geom_xmat[g][6:9]) for g in geoms)
-
-
-def _support(model: mujoco.MjModel, geom: int, d: Array) -> float:
-    """Support of a geom in the direction d of its own frame; of a mesh, which is not symmetric, in the direction −d."""
-    kind, s = model.geom_type[geom], model.geom_size[geom]
-    if kind == _GEOM.mjGEOM_SPHERE:
-        return float(s[0])
-    if kind == _GEOM.mjGEOM_CAPSULE:
-        return float(s[0] + s[1] * abs(d[2]))
-    if kind == _GEOM.mjGEOM_ELLIPSOID:
-        return float(np.linalg.norm(s * d))
-    if kind == _GEOM.mjGEOM_BOX:
-        return float(np.sum(s * np.abs(d)))
-    if kind == _GEOM.mjGEOM_CYLINDER:
-        return float(s[0] * np.sqrt(max(0.0, 1.0 - d[2] ** 2)) + s[1] * abs(d[2]))
-    if kind == _GEOM.mjGEOM_MESH:
-        mesh = int(model.geom_dataid[geom])
-        first, n = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-        return float(-np.min(model.mesh_vert[first : first + n] @ d))
-    raise ValueError(f"geom {geom} is of type {kind}, which has no lowest point here")
+    """Smallest height of the geoms' surfaces above the floor [m], `_MAX_HEIGHT` at most; after `mj_kinematics`."""
+    floor = model.geom("floor").id
+    return min(mujoco.mj_geomDistance(model, data, floor, geom, _MAX_HEIGHT, None) for geom in geoms)
 
 
 Camera = Literal["three-quarter", "front", "side", "back", "above"]

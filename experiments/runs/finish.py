@@ -11,7 +11,7 @@ from experiments.results.pages.report import lines_of, write_report_of
 from experiments.runs.reproduce import check_files
 from experiments.runs.run import session_summary, write_animations, write_summary
 from experiments.setups.wiring import wire
-from sim.loop.loop import Loop, peak_memory_mb
+from sim.loop.loop import peak_memory_mb
 from sim.recording.recording import Recording
 
 
@@ -43,10 +43,7 @@ def _complete(folder: Path) -> None:
         check_files(config, recording)
         session = wire(config, clips_of(recording), compiler(Console(stderr=True)))
         seconds = len(recording.channel("ticks", "t")) * session.servo.plant.period
-        loop = Loop(
-            session.servo, session.world, python_laws=session.parts.program.python_laws, **session.intent_arguments
-        )
-        times = loop.run(seconds)
+        times = session.loop().run(seconds)
     speed = SpeedSummary(times.real_time_factor, float("nan"), peak_memory_mb())
     write_summary(folder, session_summary(folder, session, speed))
     write_animations(folder, session)

@@ -29,7 +29,7 @@ from experiments.setups.wiring import wire
 from geometry.whole_files import write_text
 from models.mocap.readers.own_bvh import write_bvh_blocks
 from sim.loop.channels import groups, record_into, shown_configuration
-from sim.loop.loop import BLOCK_SECONDS, Loop, peak_memory_mb
+from sim.loop.loop import BLOCK_SECONDS, peak_memory_mb
 from sim.loop.servo import FrameLog, TickLog
 from sim.recording.recorder import Recorder
 from sim.recording.recording import Recording
@@ -147,9 +147,7 @@ def _simulate(
             )
         )  # fmt: skip
 
-    laws = session.parts.program.python_laws
-    block = VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS
-    loop = Loop(servo, session.world, observe, block, laws, **session.intent_arguments)
+    loop = session.loop(observe, VIEW_BLOCK_SECONDS if view else BLOCK_SECONDS)
     first = servo.plant.period * servo.figure_ticks
     rest = first * (round(seconds / first) - 1)  # a whole number of figure updates, as many as in a single call
     with session.naming_laws():

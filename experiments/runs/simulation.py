@@ -38,7 +38,6 @@ from experiments.setups.wiring import check_rates, check_seconds, wire_parts
 from geometry.arrays import Array
 from models.world.scene import SceneConfig
 from sim.devices.device import available_ticks
-from sim.loop.loop import Loop
 from sim.users.hand.actions import Grab, Push, Turn
 from sim.users.hand.arm import Arm
 from sim.users.intents.intent import PersonIntent
@@ -289,9 +288,7 @@ class Simulation:
     def __iter__(self) -> Iterator[Tick]:
         """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
-        loop = Loop(
-            session.servo, session.world, python_laws=session.parts.program.python_laws, **session.intent_arguments
-        )
+        loop = session.loop()
         left = available_ticks(session.servo.device)
         for _ in itertools.count() if left is None else range(left):
             with session.naming_laws():

@@ -1,9 +1,8 @@
 """A wired run: its parts, the constant data that its recording keeps, and the animation of its unedited curve."""
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +23,7 @@ from models.mocap.motion.clip import Clip
 from models.phantom.parameters import PREMIUM_1_5
 from models.world.scene import P_WH
 from sim.devices.simulated import SimulatedPhantom
+from sim.loop.loop import BLOCK_SECONDS, Loop, Observer, ignore
 from sim.loop.servo import Servo
 from sim.reference.reference import make_reference, map_poses, reference_along
 from sim.users.participant import Participant
@@ -65,18 +65,17 @@ class Session:
         """The map of the figure, with gaze and lean if it has them."""
         return self.parts.maps.whole_map
 
-    @property
-    def intent_arguments(self) -> Mapping[str, Any]:
-        """Keyword arguments of `sim.loop.loop.Loop` for a person's intent in Python; empty if there is none."""
-        user, device = self.parts.user, self.servo.device
+    def loop(self, observe: Observer = ignore, block_seconds: float = BLOCK_SECONDS) -> Loop:
+        """The run's loop, with its laws and its person's intent in Python, if it has any; see `sim.loop.loop.Loop`."""
+        user, device, laws = self.parts.user, self.servo.device, self.parts.program.python_laws
         own = user.own if isinstance(user, Participant) else None
         if own is None or own.compiled or not isinstance(device, SimulatedPhantom):
-            return {}
+            return Loop(self.servo, self.world, observe, block_seconds, laws)
 
         def ask(t: float) -> None:
             own.ask(device.user.person, t)
 
-        return {"ask": ask, "ask_seconds": own.every}
+        return Loop(self.servo, self.world, observe, block_seconds, laws, ask=ask, ask_seconds=own.every)
 
     @property
     def _clip_names(self) -> str:

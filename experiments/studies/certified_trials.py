@@ -4,7 +4,6 @@ Place, curve, gains, clock and interval of hands of each river are random; in ea
 are released with random offsets and velocities. ``python -m experiments.studies.certified_trials`` draws 1000.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +17,6 @@ from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, Conditions, Trial, draw_trial, hand_path
 from experiments.studies.trial_onset import predicted
-from geometry.whole_files import write_text
 from sim.errors import SimError
 
 MAX_INITIAL_FORCE = 3.0  # [N] largest initial force of the law, which motors and limiter allow anywhere
@@ -107,15 +105,11 @@ def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) 
     return Release(float(distance[: -ticks // 10].max()), float(distance[-ticks // 10 :].max()), slack)
 
 
-def certified_trials(
-    out: Path = Path("runs/certified_trials"), rivers: int = 50, hands: int = 20, seed: int = 1
-) -> None:
-    """Release hands in certified rivers, under the assumptions and with friction and rounding; write ``certified.md``.
+def certified_trials(rivers: int = 50, hands: int = 20, seed: int = 1) -> None:
+    """Release hands in certified rivers, under the assumptions and with friction and rounding; print the table.
 
     Parameters
     ----------
-    out : Path
-        Folder.
     rivers, hands : int
         Number of rivers, and of hands in each.
     seed : int
@@ -130,19 +124,14 @@ def certified_trials(
         for releases, conditions in zip(found.values(), (ASSUMED_CONDITIONS, FULL_CONDITIONS), strict=True):
             releases += [release(drawn, conditions, rng) for _ in range(hands)]
         print(f"{number + 1}/{rivers}: {sum(r.diverges for releases in found.values() for r in releases)}", flush=True)
-    lines = [
-        f"{rivers} certified rivers, periods of {1e3 * min(clocks):.2f} to {1e3 * max(clocks):.2f} ms (seed {seed})",
-        "",
-        "| | simulations | diverge | distance at the end / largest, median | worst |",
-        "|---|---|---|---|---|",
-    ]
+    print(
+        f"{rivers} certified rivers, periods of {1e3 * min(clocks):.2f} to {1e3 * max(clocks):.2f} ms (seed {seed})\n"
+    )
+    print("| | simulations | diverge | distance at the end / largest, median | worst |", "|---" * 5 + "|", sep="\n")
     for name, releases in found.items():
         shares = np.array([r.after / r.before if np.isfinite(r.before) else np.inf for r in releases])
         diverge = sum(r.diverges for r in releases)
-        lines.append(f"| {name} | {len(releases)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "certified.md", "\n".join(lines) + "\n")
-    print("\n".join(lines))
+        print(f"| {name} | {len(releases)} | {diverge} | {np.median(shares):.2g} | {shares.max():.2f} |")
 
 
 if __name__ == "__main__":

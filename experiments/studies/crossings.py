@@ -4,26 +4,18 @@
 """
 
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
-import mujoco
 import numpy as np
-import numpy.typing as npt
-from numba import njit
 
-from controllers.certificates.loop.hand import HandImpedance
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.fields.algebra.law import Program
-from controllers.fields.algebra.program import Compiled, evaluate
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
-from controllers.safety.limiter import ForceLimiter, limit_force
-from controllers.state import HAND_POSITION, HAND_QUATERNION
-from experiments.certify.trial_simulation import linkage_plant, trial_model
 from experiments.config.maps import Circle, Cylindrical
 from experiments.config.modes import Rivers
+from experiments.config.options import run_config
 from experiments.setups.modes.rivers import (
     ADMISSION,
     HYSTERESIS,
@@ -35,22 +27,20 @@ from experiments.setups.modes.rivers import (
 )
 from experiments.setups.parts.defaults import river_gains
 from experiments.setups.parts.lap import DEFAULT_LAP
+from experiments.setups.wiring import wire
 from experiments.studies.field_figures import SPEED, straight_river
+from experiments.studies.released_hand import released
 from geometry.arrays import Array
-from models.world.scene import SceneConfig
 from sim.users.hand.actions import Push
 from sim.users.hand.arm import Arm
-from sim.world.phantom_port import PhantomPort, actuate, phantom_port, sense
-from sim.world.plant import Hand, Plant, advance, make_hand
-from sim.world.world import place_stylus
 
 Form = Literal["discrete", "smooth"]
+Ticks = dict[str, Array]
 
 ANGLES = (0, 10, 15, 20, 30, 45, 60, 90)  # between two rivers [degrees]
 PUSHES = (0.0, 0.2, 0.5, 1.0, 2.0)  # [N]
 PUSH_SECONDS = 0.2  # [s]
 PASSAGE_SECONDS = 1.25  # [s] from 45 mm before the crossing to 45 mm behind it
-CUTOFF = 150.0  # of the velocity filter, as in a run [Hz]
 
 GAINS = ((300.0, 8.0), (300.0, 16.0), (300.0, 24.0), (150.0, 16.0), (150.0, 20.0))  # k_r [N/m], b_d [N s/m]
 RIVER_PUSHES = (0.5, 0.7, 0.9, 1.1, 1.3, 1.6, 2.0, 2.5)  # [N]
@@ -58,72 +48,9 @@ PUSH_LEADS = (-0.1, 0.0, 0.1)  # [s] by which a push begins before the crossing
 PUSH_DURATIONS = (0.2, 0.4)  # [s] duration of a push
 
 
-class Passage(NamedTuple):
-    """A hand's passage through a crossing, tick by tick.
-
-    Attributes
-    ----------
-    p : Array
-        Position in H [m], shape (n, 3).
-    force : Array
-        Limited force of the field [N], shape (n, 3).
-    river : Array
-        River that has the hand, −1 for none, shape (n,).
-    """
-
-    p: Array
-    force: Array
-    river: Array
-
-
-@njit
-def _run_passage(  # noqa: PLR0913 - a kernel takes the arrays of a loop one by one
-    plant: Plant, port: PhantomPort, hand: Hand, field: Compiled, memory: Array, limits: Array,
-    limiter: Array, p: Array, force: Array, river: Array,
-) -> None:  # fmt: skip
-    wrench, applied = np.zeros(6), np.zeros((plant.substeps, 3))
-    for k in range(p.shape[0]):
-        t = k * plant.period
-        sense(port, t, 0.0)
-        evaluate(field.units, field.ops, field.params, memory, port.hand, wrench)
-        limit_force(limits, limiter, wrench, force[k])
-        actuate(port, force[k])
-        p[k], river[k] = port.hand[HAND_POSITION:HAND_QUATERNION], memory[TRACE_RIVER]
-        advance(plant, port, hand, t, False, applied)
-
-
-def passage(program: Program, start: npt.ArrayLike, seconds: float, pushes: tuple[Push, ...]) -> Passage:
-    """Release the simulated Phantom from rest in a field, in the hand of a relaxed user who pushes.
-
-    Parameters
-    ----------
-    program : Program
-        The field.
-    start : array_like, shape (3,)
-        Start position in H [m].
-    seconds : float
-        Simulated time [s].
-    pushes : tuple of Push
-        Pushes of the hand.
-    """
-    scene = SceneConfig()
-    substeps = scene.substeps()
-    model = trial_model(
-        HandImpedance(0.0, 0.0, 0.0), scene.servo_period / substeps, True, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    )
-    data = mujoco.MjData(model)
-    place_stylus(model, data, np.asarray(start, dtype=float))
-    mujoco.mj_forward(model, data)
-    port = phantom_port(model, data, scene.servo_period, CUTOFF)
-    plant = linkage_plant(model, data, port, substeps)
-    limiter = ForceLimiter(scene.servo_period)
-    n = round(seconds / scene.servo_period)
-    p, force, river = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    _run_passage(
-        plant, port, make_hand(Arm(pushes=pushes)), program.compiled(), program.fresh_memory(),
-        limiter.limits(), limiter.fresh_memory(), p, force, river,
-    )  # fmt: skip
-    return Passage(p, force, river)
+def passage(program: Program, start: Array, seconds: float, pushes: tuple[Push, ...]) -> Ticks:
+    """Release a relaxed hand that pushes, in a field without a figure; see `released`."""
+    return released(wire(run_config(figure="none")), program, start, Arm(pushes=pushes), seconds)
 
 
 def crossing_field(second: River, form: Form, alone: bool) -> Program:
@@ -139,16 +66,17 @@ def crossing_field(second: River, form: Form, alone: bool) -> Program:
     ).program()
 
 
-def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Passage:
+def pushed_passage(second: River, form: Form, newtons: float, alone: bool = False) -> Ticks:
     """Passage through the origin along x, with a push in the plane across the first river, towards the second."""
     pushes = (Push(0.0, PUSH_SECONDS, newtons, (0.0, 1.0, 0.0), (-0.0075, 0.0, 0.0), 0.004),) if newtons else ()
-    return passage(crossing_field(second, form, alone), (-0.045, 0.0, 0.0), PASSAGE_SECONDS, pushes)
+    start = np.array([-0.045, 0.0, 0.0])
+    return passage(crossing_field(second, form, alone), start, PASSAGE_SECONDS, pushes)
 
 
-def outcome(found: Passage) -> str:
+def outcome(river: Array) -> str:
     """Which river had the hand at the end, and for how long none had it, if that was 20 ms or more."""
-    lost = float(np.sum(found.river < 0.0)) * 1e-3
-    end = "out" if found.river[-1] < 0.0 else f"{int(found.river[-1]) + 1}"
+    lost = float(np.sum(river < 0.0)) * 1e-3
+    end = "out" if river[-1] < 0.0 else f"{int(river[-1]) + 1}"
     return end if lost < 0.02 else f"{end} ({lost:.2f} s)"
 
 
@@ -160,8 +88,8 @@ def crossing_passages() -> str:
         for form in ("discrete", "smooth"):
             passages = [pushed_passage(straight_river(degrees), form, force) for force in PUSHES]
             alone = pushed_passage(straight_river(degrees), form, 0.0, alone=True)
-            away = 1e3 * float(np.max(np.abs(passages[0].p - alone.p)))
-            cells = " | ".join(outcome(one) for one in passages)
+            away = 1e3 * float(np.max(np.abs(passages[0]["p"] - alone["p"])))
+            cells = " | ".join(outcome(one["river"]) for one in passages)
             lines.append(f"| {degrees}° | {form} | {away:.3f} | {cells} |")
     return "\n".join(lines)
 
@@ -178,7 +106,7 @@ def changed_over(mode: Rivers, newtons: float) -> tuple[int, int, int]:
         at = curve.start + (0.5 if up > 0.0 else 0.75) * curve.duration - lead
         x, y, z = (float(value) for value in curve.point(at))
         push = Push(0.2, lasts, newtons, (0.0, 0.0, up), (x, y, z), 0.003)
-        river = passage(program, curve.point(at - 0.5), 1.6, (push,)).river
+        river = passage(program, curve.point(at - 0.5), 1.6, (push,))["river"]
         lost = bool(river[-1] < 0.0 or np.sum(river < 0.0) > 100)
         changed, out = changed + int(not lost and bool(river[-1] > 0.0)), out + int(lost)
     return changed, out, len(pushes)

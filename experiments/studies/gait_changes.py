@@ -17,8 +17,8 @@ import numpy as np
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import stylus_path
 from experiments.files.map_files import load_figure_map
-from experiments.fitting.verdict import FPS, Verdict
-from experiments.preparation.tracking_trial import followed
+from experiments.fitting.verdict import FPS
+from experiments.preparation.tracking_trial import Followed, followed
 from experiments.setups.modes.lifted_runs import curve_number
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
@@ -51,12 +51,11 @@ def _animation(haptic_map: Lifted, angles: Array, shares: Array, curves: tuple[i
     return Clip(map_poses(haptic_map, stylus_path(points)), FPS, "change")
 
 
-def _followed(clip: Clip) -> Verdict:
-    result = followed(clip, clip.duration - 1.0, compile_units)
-    return Verdict(result.residual, np.inf if result.fell is None else result.fell)
+def _followed(clip: Clip) -> Followed:
+    return followed(clip, clip.duration - 1.0, compile_units)
 
 
-def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tuple[float, float]) -> Verdict:
+def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tuple[float, float]) -> Followed:
     """How the figure follows a hand that goes from one closed curve to another, begun at an angle [rad].
 
     Place and pace change along smooth steps of the given durations [s]; needs compiled code.
@@ -76,7 +75,7 @@ def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tu
     return _followed(_animation(haptic_map, np.array(angles), np.array(shares), curves))
 
 
-def held(haptic_map: Lifted, curves: tuple[int, int], share: float, seconds: float = 9.0) -> Verdict:
+def held(haptic_map: Lifted, curves: tuple[int, int], share: float, seconds: float = 9.0) -> Followed:
     """How the figure follows a hand that is held at a share of the way from one closed curve to another."""
     first, second = (_paces(haptic_map, i) for i in curves)
     angles = [0.0]
@@ -85,8 +84,8 @@ def held(haptic_map: Lifted, curves: tuple[int, int], share: float, seconds: flo
     return _followed(_animation(haptic_map, np.array(angles), np.full(len(angles), share), curves))
 
 
-def _cell(verdict: Verdict) -> str:
-    return f"falls {verdict.fell:.1f}" if verdict.falls else f"{100 * verdict.residual:.1f}"
+def _cell(result: Followed) -> str:
+    return f"{100 * result.residual:.1f}" if result.fell is None else f"falls {result.fell:.1f}"
 
 
 def main(file: str, first: str, second: str) -> None:

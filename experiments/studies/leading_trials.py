@@ -1,16 +1,14 @@
 """Experiment that could refute LEADING's certificate: at which gain its springs make the linkage in MuJoCo unstable.
 
 Each trial is in one regime of the force, with a figure that hardly accelerates, so that the walker is frozen; the hand
-exerts a constant force where the regime needs one. ``python -m experiments.studies.leading_trials`` writes the table of
+exerts a constant force where the regime needs one. ``python -m experiments.studies.leading_trials`` prints the table of
 the docs.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
-import tyro
 
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
 from controllers.certificates.loop.leading_law import Regime
@@ -28,7 +26,6 @@ from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
-from geometry.whole_files import write_text
 from sim.users.hand.arm import Arm
 
 SCALE, STIFFNESS_RATIO, WALKER_RATE = 1e5, 1.5, 0.1  # S, k_z/k_l, ω [1/s]: the walker's motion is negligible
@@ -112,27 +109,19 @@ TRIALS: Mapping[str, LeadingTrial] = {
 }
 
 
-def leading_trials(out: Path = Path("runs/leading_trials")) -> None:
-    """Predict and observe the critical k_l of every trial, and write ``leading.md``.
-
-    Parameters
-    ----------
-    out : Path
-        Folder.
-    """
-    lines = ["| where | T [ms] | delay | b [N s/m] | predicted k_l [N/m] | in MuJoCo |", "|---|---|---|---|---|---|"]
+def main() -> None:
+    """Predict and observe the critical k_l of every trial, and print the table."""
+    print("| where | T [ms] | delay | b [N s/m] | predicted k_l [N/m] | in MuJoCo |", "|---" * 6 + "|", sep="\n")
     for name, trial in TRIALS.items():
         expected = predicted(trial)
         found = observed(trial, expected, Conditions())
         clock = trial.sampling
-        lines.append(
+        print(
             f"| {name} | {1e3 * clock.period:g} | {clock.whole_delay} T | {trial.b_d:g} | {expected:.1f} "
-            f"| {100.0 * (found / expected - 1.0):+.2f} % |"
+            f"| {100.0 * (found / expected - 1.0):+.2f} % |",
+            flush=True,
         )
-        print(lines[-1], flush=True)
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "leading.md", "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":
-    tyro.cli(leading_trials)
+    main()

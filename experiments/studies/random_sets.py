@@ -36,7 +36,6 @@ from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import MAX_LIMIT_EXCESS
 from sim.body.falls import UP
-from sim.loop.loop import Loop
 
 TUNING = (
     "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "deepmimic/humanoid3d_backflip.txt", "deepmimic/humanoid3d_dance_a.txt",
@@ -118,7 +117,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         session = wire(config, tuple(clips))
     played, laps = getattr(session.haptic_map, "loops", loops), getattr(session.haptic_map, "laps", 1)
     log = TrialLog(session.servo, session.world)
-    Loop(session.servo, session.world, log).run(RUN_SECONDS)
+    session.loop(log).run(RUN_SECONDS)
     frames, weight = log.frames, session.weight
     fallen = np.flatnonzero(frames["down"] != UP)
     fell = float(frames["t"][fallen[0]]) if len(fallen) else None

@@ -11,13 +11,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE, TRACE_RIVER
 from controllers.fields.algebra.law import Program
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.governor import Governor, governor_force
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.river import River
-from controllers.state import VELOCITY
 from experiments.config.options import run_config
 from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import STYLE
@@ -26,16 +24,12 @@ from experiments.setups.parts.governor import speeds_along
 from experiments.setups.parts.part_types import ClipMapParts
 from experiments.setups.session import Session
 from experiments.setups.wiring import wire
+from experiments.studies.released_hand import released
 from geometry.arrays import Array
 from geometry.easing import smooth_step
-from models.humanoid.skeleton import rest_pose
-from sim.devices.simulated import SimulatedPhantom
-from sim.loop.loop import Loop
-from sim.loop.servo import FrameLog, TickLog
 from sim.users.hand.arm import Arm
 from sim.viewer.palette import CURVE, FIELD, USER
 from sim.viewer.palette import TUBE as TUBE_COLOUR
-from sim.world.phantom_port import sense_in_motion
 
 DRAG, TUBE = 8.0, 0.015  # drag of governor and river [N s/m], radius of the tube [m]
 SPEEDS = np.arange(0.02, 0.19, 0.015)  # at which hands are led [m/s]
@@ -123,26 +117,12 @@ class LedBackflip:
 
     def passage(self, program: Program, path: Array) -> Passage:
         """Lead a hand along a path, in steps of `STEP`, in a field."""
-        session = self._session()
-        session.world.reset(path[0], rest_pose())
-        field = session.servo.field.of(program)
-        phantom = session.servo.device
-        assert isinstance(phantom, SimulatedPhantom)
-        sense_in_motion(phantom.port)  # at zero velocity, as the path begins at rest
-        device = phantom.held_by(Arm(400.0, 10.0, path, STEP))
-        servo = session.servo._replace(field=field, device=device)
-        blocks: list[tuple[Array, ...]] = []
-
-        def keep(ticks: TickLog, frames: FrameLog, n: int) -> None:
-            hand, trace = ticks.hand[:n], ticks.trace[:n]
-            along = self.curve.velocity(trace[:, TRACE_PHASE])
-            along /= np.linalg.norm(along, axis=1, keepdims=True)
-            speed, force = (np.sum(a * along, axis=1) for a in (hand[:, VELOCITY], ticks.force[:n]))
-            columns = (hand[:, 0], trace[:, TRACE_PHASE], trace[:, TRACE_DISTANCE], speed, force, trace[:, TRACE_RIVER])
-            blocks.append(tuple(column.copy() for column in columns))
-
-        Loop(servo, session.world, keep).run(STEP * (len(path) - 1))
-        return Passage(*(np.concatenate(column) for column in zip(*blocks, strict=True)))
+        arm = Arm(400.0, 10.0, path, STEP)
+        ticks = released(self._session(), program, path[0], arm, STEP * (len(path) - 1))
+        along = self.curve.velocity(ticks["phase"])
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        speed, force = (np.sum(ticks[name] * along, axis=1) for name in ("v", "force"))
+        return Passage(ticks["t"], ticks["phase"], ticks["distance"], speed, force, ticks["river"])
 
     def force_at(self, speed: float) -> tuple[float, float]:
         """Speed [m/s] of a hand where it touches the curve in mid-flight, and the governor's force on it there [N]."""

@@ -23,7 +23,6 @@ from models.mocap.motion.clip import Clip
 from sim.body.falls import UP
 from sim.body.figure_state import FigureGains
 from sim.body.tracking import TrackingConfig, track
-from sim.loop.loop import Loop
 
 BOUNDS = ((1.0, 0.2), (0.5, 0.1), (0.2, 0.04), (0.1, 0.02), (0.05, 0.01))
 """Bounds of the force as a share of body weight, and of the moment as a share of body weight × stature."""
@@ -61,7 +60,7 @@ def run_cell(seconds: float, words: Mapping[str, Any], force: float, moment: flo
         )
         session = wire(config)
         log = TrialLog(session.servo, session.world)
-        Loop(session.servo, session.world, log).run(seconds)
+        session.loop(log).run(seconds)
         frames, measure = log.frames, session.weight * np.array([1.0, config.figure.stature])
         up = frames["down"] == UP
         fell += int(not up.all())

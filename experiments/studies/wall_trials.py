@@ -12,14 +12,13 @@ from experiments.config.options import run_config
 from experiments.files.figure_files import save_figure
 from experiments.results.pages.figures import PLAIN_STYLE
 from experiments.setups.wiring import wire
+from experiments.trials.trial.measures import TrialLog
 from geometry.arrays import Array
 from geometry.rotations import exponential, multiply
 from models.humanoid.skeleton import JOINTS, N_POSE
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from sim.loop.loop import Loop
-from sim.loop.servo import FrameLog, TickLog
 from sim.users.hand.actions import Push
 from sim.viewer.palette import CURVE, FIELD, USER
 
@@ -49,17 +48,10 @@ def pushed_run(walls: bool) -> WallRun:
     inside = embedded("squat_dance")
     config = run_config(seconds=_RUN_DURATION, walls=walls, pushes=(Push(2.0, 3.0, 2.5),))
     session = wire(config, (inside, with_broken_elbow(inside)))
-    frames: list[tuple[Array, Array, Array]] = []
-
-    def observe(ticks: TickLog, block: FrameLog, n: int) -> None:
-        every = session.servo.figure_ticks
-        m = -(-n // every)
-        place = ticks.hand[: m * every : every, 1:3]
-        excess = beyond_ranges(block.reference[:m]).max(axis=1)
-        frames.append((block.t[:m].copy(), np.hypot(place[:, 0], place[:, 1]), excess))
-
-    Loop(session.servo, session.world, observe).run(_RUN_DURATION)
-    return WallRun(*(np.concatenate(channel) for channel in zip(*frames, strict=True)))
+    log = TrialLog(session.servo, session.world)
+    session.loop(log).run(_RUN_DURATION)
+    x, y, _ = log.ticks["p"][:: session.servo.figure_ticks].T
+    return WallRun(log.frames["t"], np.hypot(x, y), beyond_ranges(log.frames["reference"]).max(axis=1))
 
 
 def wall_figure(without: WallRun, with_walls: WallRun) -> Figure:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness
 from controllers.errors import ControllerError
 from experiments.certify.cached_stability import Stability, cached_stability
@@ -86,7 +85,7 @@ def half_critical(config: TuneConfig) -> dict[str, float] | None:
         river = certified_rivers(config.config({}))[""]
     except ControllerError:
         return None
-    loops = [SampledLoop(river.still(hand), river.sampling) for hand in HandRange().hands()]
+    loops = [river.loop(hand) for hand in HandRange().hands()]
     return {"stiffness": GAIN_RATIO * min(float(critical_stiffness(loop, river.b_d).min()) for loop in loops)}
 
 

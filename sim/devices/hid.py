@@ -72,9 +72,7 @@ class HidPhantom:
         self._read_calibration()
         self._io, self._reading, self._zero_torque = items(self._hid.io), items(self._hid.reading), np.zeros(3)
         self._judge, self._make_command = BoundCall(judge_report, (self._hid,)), BoundCall(make_command, (self._hid,))
-        incoming, outgoing = self._hid.incoming.u8, self._hid.outgoing.u8[: protocol.REPORT_SIZE]
-        incoming = incoming[: protocol.REPORT_SIZE + 1]  # one byte more, so that a report that is too long shows
-        self._receive, self._send = _make_transfers(handle, incoming, outgoing)
+        self._receive, self._send = _make_transfers(handle, self._hid.received, self._hid.sent)
 
     def _read_feature(self, number: int) -> Any:
         try:

@@ -25,7 +25,7 @@ STATUS_AMPLIFIER, STATUS_ENCODER, STATUS_REFUSED = 16, 32, 64
 HAS_MOTORS, HAS_WATCHDOG, HAS_TEMPERATURE, HAS_GIMBAL = 1, 2, 4, 8
 NO_TEMPERATURE = -(2**15)
 
-_CRC_OFFSET = REPORT_SIZE - 4
+CRC_OFFSET = REPORT_SIZE - 4
 
 INPUT_REPORT = np.dtype([
     ("report", "u1"), ("flags", "u1"), ("status", "<u2"), ("sequence", "<u4"), ("time_us", "<u8"),
@@ -60,13 +60,13 @@ def empty_report(report: int) -> npt.NDArray[Any]:
 
 def encode_report(report: npt.NDArray[Any]) -> bytes:
     """A report's 64 bytes, including its checksum."""
-    body = report.tobytes()[:_CRC_OFFSET]
+    body = report.tobytes()[:CRC_OFFSET]
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 
 def has_valid_checksum(report: bytes) -> bool:
     """Whether the checksum of a report's 64 bytes is right."""
-    return zlib.crc32(report[:_CRC_OFFSET]) == int.from_bytes(report[_CRC_OFFSET:], "little")
+    return zlib.crc32(report[:CRC_OFFSET]) == int.from_bytes(report[CRC_OFFSET:], "little")
 
 
 def decode_report(report: bytes, number: int) -> npt.NDArray[Any]:

@@ -1,7 +1,6 @@
 """Checking of input reports and encoding of output reports of the open HID protocol, compiled and allocation-free.
 
-The layouts are those of `sim.devices.hid_protocol`. Every field is aligned, so a buffer is viewed both as bytes and as
-integers of each size. The host must be little-endian, as the protocol is.
+The layouts are those of `sim.devices.hid_protocol`, by which compiled code reads and writes the fields of a buffer.
 """
 
 import math
@@ -38,24 +37,6 @@ IO_ENABLE_TIME, IO_ENABLE_DEVICE_TIME, IO_LENGTH = 7, 8, 9
 the report [bytes]; time by the host's clock; time of the last reading handed out by the device's clock [s]; 1 if the
 motors are to be on; both times when the motors were last commanded on."""
 
-_OFFSETS = {
-    record: {name: field[1] for name, field in (layout.fields or {}).items()}
-    for record, layout in ((protocol.INPUT, protocol.INPUT_REPORT), (protocol.OUTPUT, protocol.OUTPUT_REPORT))
-}
-_STATUS, _BOOT = _OFFSETS[protocol.INPUT]["status"] // 2, _OFFSETS[protocol.INPUT]["boot"] // 2
-_SEQUENCE, _TIME = _OFFSETS[protocol.INPUT]["sequence"] // 4, _OFFSETS[protocol.INPUT]["time_us"] // 8
-_ENCODER, _CELSIUS = _OFFSETS[protocol.INPUT]["encoder"] // 4, _OFFSETS[protocol.INPUT]["temperature"] // 2
-_ANSWERED, _HELD_TIME = _OFFSETS[protocol.INPUT]["answered"] // 4, _OFFSETS[protocol.INPUT]["held_us"] // 4
-_CRC_WORD, _CRC_OFFSET = _OFFSETS[protocol.INPUT]["crc"] // 4, _OFFSETS[protocol.INPUT]["crc"]
-_OUT_BOOT, _OUT_SEQUENCE = _OFFSETS[protocol.OUTPUT]["boot"] // 2, _OFFSETS[protocol.OUTPUT]["sequence"] // 4
-_OUT_WATCHDOG, _OUT_TORQUE = _OFFSETS[protocol.OUTPUT]["watchdog_us"] // 4, _OFFSETS[protocol.OUTPUT]["torque"] // 4
-_OUT_ANSWERS = _OFFSETS[protocol.OUTPUT]["answers"] // 4
-_SIZE, _INPUT, _OUTPUT = protocol.REPORT_SIZE, protocol.INPUT, protocol.OUTPUT
-_ENABLE, _SWITCH = protocol.ENABLE, protocol.SWITCH
-_STATUS_WATCHDOG, _STATUS_HOT, _STATUS_ENABLED = protocol.STATUS_WATCHDOG, protocol.STATUS_HOT, protocol.STATUS_ENABLED
-_NO_CELSIUS = protocol.NO_TEMPERATURE
-_CELSIUS_UNIT, _TORQUE_UNIT = protocol.TEMPERATURE_UNIT, protocol.TORQUE_UNIT
-
 _REPORT_MALFORMED, _CHECKSUM_WRONG = int(Fault.REPORT_MALFORMED), int(Fault.CHECKSUM_WRONG)
 _DEVICE_RESET, _SEQUENCE_BACK, _TOO_HOT = int(Fault.DEVICE_RESET), int(Fault.SEQUENCE_BACK), int(Fault.OVER_TEMPERATURE)
 _DEVICE_REPORTED, _FORCE_NOT_FINITE = int(Fault.DEVICE_REPORTED), int(Fault.FORCE_NOT_FINITE)
@@ -77,27 +58,9 @@ _CRC_TABLE = _crc_table()
 def checksum(report: npt.NDArray[np.uint8]) -> int:
     """CRC-32 of all bytes of a report before its checksum field."""
     remainder = 0xFFFFFFFF
-    for k in range(_CRC_OFFSET):
+    for k in range(protocol.CRC_OFFSET):
         remainder = (remainder >> 8) ^ _CRC_TABLE[(remainder ^ np.int64(report[k])) & 0xFF]
     return remainder ^ 0xFFFFFFFF
-
-
-class Words(NamedTuple):
-    """Views of one buffer as integers of one, two, four and eight bytes, with the signedness that the layouts use."""
-
-    u8: npt.NDArray[Any]
-    u16: npt.NDArray[Any]
-    i16: npt.NDArray[Any]
-    u32: npt.NDArray[Any]
-    i32: npt.NDArray[Any]
-    u64: npt.NDArray[Any]
-
-    @classmethod
-    def fresh(cls) -> "Words":
-        """A buffer of zeros, larger than a report so that one that is too long shows."""
-        buffer = np.zeros(_SIZE + 8, np.uint8)
-        kinds = (np.uint8, np.uint16, np.int16, np.uint32, np.int32, np.uint64)
-        return cls(*(buffer.view(kind) for kind in kinds))
 
 
 class HidMemory(NamedTuple):
@@ -105,8 +68,11 @@ class HidMemory(NamedTuple):
 
     Attributes
     ----------
-    incoming, outgoing : Words
-        The last input report, and the next output report.
+    received, sent : array of uint8
+        Bytes of the last input report, with room for eight more so that one that is too long shows, and of the next
+        output report.
+    incoming, outgoing : array
+        The same as records, shape (1,): `hid_protocol.INPUT_REPORT` and `OUTPUT_REPORT`.
     numbers : IntArray
         See `N_LAST`.
     io : Array
@@ -125,8 +91,10 @@ class HidMemory(NamedTuple):
         Those of `sim.devices.driver.note_arrival`.
     """
 
-    incoming: Words
-    outgoing: Words
+    received: npt.NDArray[np.uint8]
+    sent: npt.NDArray[np.uint8]
+    incoming: npt.NDArray[Any]
+    outgoing: npt.NDArray[Any]
     numbers: IntArray
     io: Array
     zero: Array
@@ -143,9 +111,12 @@ class HidMemory(NamedTuple):
     def fresh(cls, telemetry: Array) -> "HidMemory":
         """Memory before the first report; identity and calibration of the device are not read yet."""
         numbers, io = np.zeros(N_SIZE, np.int64), np.zeros(IO_LENGTH)
+        received, sent = np.zeros(protocol.REPORT_SIZE + 8, np.uint8), np.zeros(protocol.REPORT_SIZE, np.uint8)
         numbers[[N_LAST, N_ENABLED]], io[IO_READING_TIME] = -1, math.nan
+        incoming = received[: protocol.REPORT_SIZE].view(protocol.INPUT_REPORT)
+        outgoing = sent.view(protocol.OUTPUT_REPORT)
         return cls(
-            Words.fresh(), Words.fresh(), numbers, io, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
+            received, sent, incoming, outgoing, numbers, io, np.zeros(6), np.zeros(6), np.zeros(3), np.zeros(3),
             np.zeros(3), np.full(_SEND_TIME_COUNT, np.nan), np.zeros(READING_SIZE), telemetry, np.full(3, np.nan),
         )  # fmt: skip
 
@@ -159,34 +130,34 @@ def _set_fault(io: Array, code: int, value: float) -> None:
 @entry_point
 def judge_report(hid: HidMemory) -> None:
     """Check the input report that was received; write its reading, and the result to `io`."""
-    io, numbers, telemetry, words = hid.io, hid.numbers, hid.telemetry, hid.incoming
+    io, numbers, telemetry, report = hid.io, hid.numbers, hid.telemetry, hid.incoming[0]
     io[IO_FAULT] = io[IO_NEW] = 0.0
-    if io[IO_SIZE] != _SIZE or words.u8[0] != _INPUT:
+    if io[IO_SIZE] != protocol.REPORT_SIZE or report.report != protocol.INPUT:
         telemetry[REFUSED] += 1.0
         _set_fault(io, _REPORT_MALFORMED, io[IO_SIZE])
         return
-    if checksum(words.u8) != np.int64(words.u32[_CRC_WORD]):
+    if checksum(hid.received) != report.crc:
         telemetry[REFUSED] += 1.0
         numbers[N_BAD] += 1
         if numbers[N_BAD] >= _BAD_CHECKSUM_LIMIT:
             _set_fault(io, _CHECKSUM_WRONG, numbers[N_BAD])
         return
     numbers[N_BAD] = 0
-    if np.int64(words.u16[_BOOT]) != numbers[N_BOOT]:
+    if report.boot != numbers[N_BOOT]:
         _set_fault(io, _DEVICE_RESET, 0.0)
         return
-    answered, status = np.int64(words.u32[_ANSWERED]), np.int64(words.u16[_STATUS])
+    answered, status = np.int64(report.answered), np.int64(report.status)
     if numbers[N_LAST] < 0:
         # A device last used by another program continues that program's numbers; its watchdog may have acted since.
         if answered > numbers[N_SENT]:
             numbers[N_SENT] = answered
-        numbers[N_REENABLE] = 1 if status & _STATUS_WATCHDOG else 0
-    if not _is_next(hid, np.int64(words.u32[_SEQUENCE])):
+        numbers[N_REENABLE] = 1 if status & protocol.STATUS_WATCHDOG else 0
+    if not _is_next(hid, np.int64(report.sequence)):
         return
-    measured_at = np.int64(words.u64[_TIME]) * 1e-6
+    measured_at = np.int64(report.time_us) * 1e-6
     for i in range(6):
-        hid.reading[READING_THETA + i] = (np.int64(words.i32[_ENCODER + i]) - hid.zero[i]) * hid.angle[i]
-    hid.reading[READING_SWITCH] = words.u8[1] & _SWITCH
+        hid.reading[READING_THETA + i] = (np.int64(report.encoder[i]) - hid.zero[i]) * hid.angle[i]
+    hid.reading[READING_SWITCH] = report.flags & protocol.SWITCH
     hid.reading[READING_CLOCK] = measured_at
     numbers[N_TAKEN] += 1
     hid.reading[READING_SEQUENCE] = numbers[N_TAKEN]
@@ -226,10 +197,12 @@ def _update_telemetry(hid: HidMemory, measured_at: float, answered: np.int64) ->
     """Update the telemetry: temperatures, round trip, jitter and staleness."""
     telemetry, now = hid.telemetry, hid.io[IO_NOW]
     for i in range(3):
-        celsius = np.int64(hid.incoming.i16[_CELSIUS + i])
-        telemetry[TEMPERATURE + i] = np.nan if celsius == _NO_CELSIUS else celsius * _CELSIUS_UNIT
+        celsius = np.int64(hid.incoming[0].temperature[i])
+        telemetry[TEMPERATURE + i] = (
+            np.nan if celsius == protocol.NO_TEMPERATURE else celsius * protocol.TEMPERATURE_UNIT
+        )
     if 0 <= _sequence_difference(hid.numbers[N_SENT], answered) < _SEND_TIME_COUNT:
-        held = np.int64(hid.incoming.u32[_HELD_TIME])
+        held = np.int64(hid.incoming[0].held_us)
         telemetry[ROUND_TRIP] = now - hid.sent_at[answered % _SEND_TIME_COUNT] - held * 1e-6
     note_arrival(telemetry, hid.clocks, now, measured_at)
 
@@ -241,7 +214,7 @@ def _judge_temperature(hid: HidMemory, status: np.int64) -> None:
         celsius = hid.telemetry[TEMPERATURE + i]
         if celsius > hottest:  # false for NaN, a motor without a sensor
             hottest = celsius
-    if status & _STATUS_HOT or hottest >= MAX_TEMPERATURE:
+    if status & protocol.STATUS_HOT or hottest >= MAX_TEMPERATURE:
         _set_fault(hid.io, _TOO_HOT, hottest)
 
 
@@ -255,13 +228,13 @@ def _judge_motors(hid: HidMemory, measured_at: float, answered: np.int64, status
     suspended between a reading and its command.
     """
     io, enable_command = hid.io, hid.numbers[N_ENABLED]
-    if enable_command < 0 or status & _STATUS_ENABLED:
+    if enable_command < 0 or status & protocol.STATUS_ENABLED:
         return
-    if status & _STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
+    if status & protocol.STATUS_WATCHDOG and _sequence_difference(answered, enable_command) >= 0:
         if measured_at - io[IO_READING_TIME] > 0.5 * WATCHDOG_TIME:
             hid.numbers[N_REENABLE] = 1
         else:
-            _set_fault(io, _DEVICE_REPORTED, _STATUS_WATCHDOG)
+            _set_fault(io, _DEVICE_REPORTED, protocol.STATUS_WATCHDOG)
         return
     waited = min(io[IO_NOW] - io[IO_ENABLE_TIME], measured_at - io[IO_ENABLE_DEVICE_TIME])
     if waited > WATCHDOG_TIME:
@@ -271,7 +244,7 @@ def _judge_motors(hid: HidMemory, measured_at: float, answered: np.int64, status
 @entry_point
 def make_command(hid: HidMemory) -> None:
     """Write the next output report, with torques limited to the motors' peak; none if a torque is not finite."""
-    io, numbers, words = hid.io, hid.numbers, hid.outgoing
+    io, numbers, report = hid.io, hid.numbers, hid.outgoing[0]
     io[IO_FAULT] = 0.0
     bad_value = first_not_finite(hid.torque)
     if bad_value != 0.0:
@@ -285,11 +258,11 @@ def make_command(hid: HidMemory) -> None:
     elif numbers[N_ENABLED] < 0:
         numbers[N_ENABLED] = numbers[N_SENT]
         io[IO_ENABLE_TIME], io[IO_ENABLE_DEVICE_TIME] = io[IO_NOW], io[IO_READING_TIME]
-    words.u8[0], words.u8[1] = _OUTPUT, _ENABLE if enable else 0
-    words.u16[_OUT_BOOT], words.u32[_OUT_SEQUENCE] = numbers[N_BOOT], numbers[N_SENT] % 2**32
-    words.u32[_OUT_WATCHDOG], words.u32[_OUT_ANSWERS] = numbers[N_WATCHDOG], max(0, numbers[N_LAST])
+    report.report, report.flags = protocol.OUTPUT, protocol.ENABLE if enable else 0
+    report.boot, report.sequence = numbers[N_BOOT], numbers[N_SENT] % 2**32
+    report.watchdog_us, report.answers = numbers[N_WATCHDOG], max(0, numbers[N_LAST])
     for i in range(3):
         motor_torque = min(max(hid.torque[i] / hid.turns[i], -hid.peak[i]), hid.peak[i]) if enable else 0.0
-        words.i32[_OUT_TORQUE + i] = int(np.rint(motor_torque / _TORQUE_UNIT))
-    words.u32[_CRC_WORD] = checksum(words.u8)
+        report.torque[i] = int(np.rint(motor_torque / protocol.TORQUE_UNIT))
+    report.crc = checksum(hid.sent)
     hid.sent_at[numbers[N_SENT] % _SEND_TIME_COUNT] = io[IO_NOW]

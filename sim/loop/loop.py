@@ -51,6 +51,10 @@ Observer = Callable[[TickLog, FrameLog, int], None]
 """Called after each block with its logs and the number of ticks in them; the logs are reused for the next block."""
 
 
+def ignore(ticks: TickLog, frames: FrameLog, n: int) -> None:
+    """An `Observer` that does nothing."""
+
+
 class Loop:
     """A servo and its world, run block by block.
 
@@ -81,7 +85,7 @@ class Loop:
     """
 
     def __init__(
-        self, servo: Servo, world: World, observe: Observer = lambda ticks, frames, n: None,
+        self, servo: Servo, world: World, observe: Observer = ignore,
         block_seconds: float = BLOCK_SECONDS, python_laws: Sequence[Callable[[HandState], Array]] = (),
         before_tick: Callable[[int], None] | None = None, ask: Callable[[float], None] | None = None,
         ask_seconds: float = BLOCK_SECONDS,

@@ -6,9 +6,6 @@ true size its curve would be a few pixels wide; its axes stay parallel to the wo
 the floor moves under it.
 """
 
-import contextlib
-import io
-
 import mujoco
 import numpy as np
 import viser
@@ -20,6 +17,7 @@ from sim.viewer.actor import GHOST, Actor
 from sim.viewer.drawn_curve import DrawnCurve
 from sim.viewer.framing import typical_peak, view_offsets
 from sim.viewer.palette import FIELD, MIN_PUSH_FORCE, USER, rgb
+from sim.viewer.replay_page import page_of, unserved
 from sim.viewer.shapes import body_prefix, body_shapes, distinct, drawn_radius, tube
 from sim.viewer.shown import courses
 
@@ -30,9 +28,6 @@ PHANTOM_AT = np.array([1.95, -0.55, 1.0])  # [m] where the hand frame's origin i
 GHOST_AT = np.array([-0.95, -0.65, 0.0])  # [m] offset of the ghost from the physical figure
 ARROW_LENGTH = 0.6  # [m] drawn length of a large force (`typical_peak`)
 TRAIL_SECONDS = 0.1  # [s] duration of each piece in which the path of the stylus appears
-# The only notification that a replay can show is that the browser renders in software.
-_HEAD = "<style>.mantine-Notifications-root {display: none}</style>"
-
 
 _BODY_LABELS = {FIGURE: ("physical figure", "animation h(p)", 2.0), ROBOT: ("robot arm", "h(p, R)", 1.6)}
 """Labels of the body that follows the animation and of the animation, and their height [m]."""
@@ -61,16 +56,8 @@ def replay_html(recording: Recording, model: mujoco.MjModel) -> str:
     RecordingError
         If an array or channel is missing, or the run ended before anything was recorded.
     """
-    quiet = io.StringIO()  # viser prints its address and its shutdown, which are irrelevant here
-    with contextlib.redirect_stdout(quiet):
-        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        with server.atomic():  # no browser is connected: waking the server for each message takes as long as the rest
-            page = _Stage(server.scene, recording, model).play(server)
-    finally:
-        with contextlib.redirect_stdout(quiet):
-            server.stop()
-    return page.replace("</head>", _HEAD + "</head>", 1)
+    with unserved() as server, server.atomic():
+        return _Stage(server.scene, recording, model).play(server)
 
 
 def drawn_tube(recording: Recording) -> float:
@@ -148,7 +135,7 @@ class _Stage:
             if i % piece == 0 and i > 0:
                 self._extend_trail(i // piece, int(ticks[i - piece]), int(ticks[i]))
             serializer.insert_sleep(1 / FPS)
-        return serializer.as_html()
+        return page_of(serializer)
 
     def _show(self, tick: int, frame: int, offset: Array) -> None:
         shift = np.array([*offset, 0.0])

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import trimesh
-from mjviser.conversions import create_primitive_mesh, mujoco_mesh_to_trimesh
+from mjviser.conversions import merge_geoms
 
 from geometry.arrays import Array, IntArray
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
@@ -43,27 +42,17 @@ def body_shapes(model: mujoco.MjModel, prefix: str) -> list[Shape]:
     prefix : str
         Prefix of the bodies, such as ``figure/``.
     """
-    parts: dict[tuple[int, tuple[float, ...]], list[trimesh.Trimesh]] = {}
+    parts: dict[tuple[int, tuple[float, ...]], list[int]] = {}
     for geom in range(model.ngeom):
-        body = int(model.geom_bodyid[geom])
+        body, material = int(model.geom_bodyid[geom]), int(model.geom_matid[geom])
         if model.geom_group[geom] >= FIRST_HIDDEN_GROUP or not model.body(body).name.startswith(prefix):
             continue
-        is_mesh = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH
-        mesh = mujoco_mesh_to_trimesh(model, geom) if is_mesh else create_primitive_mesh(model, geom)
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        transform = np.eye(4)
-        transform[:3, :3], transform[:3, 3] = rotation.reshape(3, 3), model.geom_pos[geom]
-        mesh.apply_transform(transform)
-        material = int(model.geom_matid[geom])
         rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-        parts.setdefault((body, tuple(float(c) for c in rgba)), []).append(mesh)
+        parts.setdefault((body, tuple(float(c) for c in rgba)), []).append(geom)
     shapes: list[Shape] = []
-    for (body, (red, green, blue, alpha)), meshes in parts.items():
-        first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-        vertices = np.concatenate([mesh.vertices for mesh in meshes])
-        faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, first[:-1], strict=True)])
-        shapes.append(Shape(body, vertices, faces, (red, green, blue, alpha)))
+    for (body, (red, green, blue, alpha)), geoms in parts.items():
+        mesh = merge_geoms(model, geoms)
+        shapes.append(Shape(body, np.array(mesh.vertices), np.array(mesh.faces), (red, green, blue, alpha)))
     return shapes
 
 

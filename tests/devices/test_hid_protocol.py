@@ -78,7 +78,7 @@ def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
         record["report"], record["status"], record["sequence"] = protocol.INPUT, 0, k + 1
         record["temperature"] = rng.integers(1 - 2**15, 9000, 3)
         hid.numbers[N_BOOT], hid.numbers[N_LAST] = record["boot"], k
-        hid.incoming.u8[:64], hid.io[IO_SIZE] = np.frombuffer(protocol.encode_report(record), np.uint8), 64
+        hid.received[:64], hid.io[IO_SIZE] = np.frombuffer(protocol.encode_report(record), np.uint8), 64
         judge_report(hid)
         assert (hid.io[IO_FAULT], hid.io[IO_NEW]) == (0.0, 1.0)
         np.testing.assert_array_equal(hid.reading[READING_THETA:], record["encoder"])
@@ -90,7 +90,7 @@ def test_compiled_encoding_and_decoding_follow_the_report_layout() -> None:
         hid.torque[:], hid.io[IO_ENABLE] = torque * protocol.TORQUE_UNIT, 1.0
         hid.numbers[N_SENT], hid.numbers[N_WATCHDOG] = sent - 1, 5000
         make_command(hid)
-        report = protocol.decode_report(hid.outgoing.u8[:64].tobytes(), protocol.OUTPUT)
+        report = protocol.decode_report(hid.sent.tobytes(), protocol.OUTPUT)
         assert report["torque"].tolist() == torque.tolist()
         fields = ("flags", "boot", "sequence", "watchdog_us", "answers")
         assert [int(report[name]) for name in fields] == [1, int(record["boot"]), sent, 5000, k + 1]

@@ -1,5 +1,6 @@
 """The shared-memory board: a reader never sees a partial write."""
 
+import pickle
 import threading
 import time
 
@@ -11,8 +12,8 @@ SIZES = {"a": 3, "b": 500}
 
 
 def test_arrays_are_read_as_written_together():
-    memory = Board.memory(SIZES)
-    writer, reader = Board(memory, SIZES), Board(memory, SIZES)
+    writer = Board(SIZES)
+    reader = pickle.loads(pickle.dumps(writer))
     writer.write({"a": [1.0, 2.0, 3.0], "b": np.arange(500.0)})
     found = reader.read()
     np.testing.assert_array_equal(found["a"], [1.0, 2.0, 3.0])
@@ -21,11 +22,13 @@ def test_arrays_are_read_as_written_together():
     np.testing.assert_array_equal(reader.read()["a"], [9.0, 2.0, 3.0])
     found["a"][:] = 0.0  # a copy
     np.testing.assert_array_equal(reader.read()["a"], [9.0, 2.0, 3.0])
+    reader.close()
+    writer.close()
 
 
 def test_reader_never_sees_a_partial_write():
-    memory = Board.memory(SIZES)
-    writer, reader = Board(memory, SIZES), Board(memory, SIZES)
+    writer = Board(SIZES)
+    reader = pickle.loads(pickle.dumps(writer))
     ended = threading.Event()
 
     def write() -> None:
@@ -44,3 +47,5 @@ def test_reader_never_sees_a_partial_write():
     finally:
         ended.set()
         thread.join()
+        reader.close()
+        writer.close()

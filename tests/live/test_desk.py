@@ -86,15 +86,15 @@ def test_bend_is_undone_and_redone(desk: LoggingDesk) -> None:
 
 def test_gain_changes_and_undo_update_the_verdict(desk: LoggingDesk) -> None:
     desk.until(lambda: bool(desk.verdict) and not desk.checking, "the first verdict")
-    assert {v.verdict for v in desk.verdict} == {"certified"}
+    assert {v.stability.verdict for v in desk.verdict} == {"certified"}
     for seek in (9000.0, 11000.0):
         desk.set_gain("seek", seek)
-    desk.until(lambda: desk.verdict[0].verdict == "refuted", "the verdict turns red")
-    assert "11000" in desk.verdict[0].reason
+    desk.until(lambda: desk.verdict[0].stability.verdict == "refuted", "the verdict turns red")
+    assert "11000" in desk.verdict[0].stability.reason
     desk.undo()  # one movement of a slider is one undo step
     assert desk.config is not None
     assert desk.config.mode.seek == 150.0
-    desk.until(lambda: desk.verdict[0].verdict == "certified", "and green again")
+    desk.until(lambda: desk.verdict[0].stability.verdict == "certified", "and green again")
 
 
 def test_take_is_recorded_and_its_animation_loads(desk: LoggingDesk) -> None:

@@ -260,7 +260,7 @@ def test_too_short_take_is_refused(tmp_path):
 
 def test_full_disk_ends_the_take_and_not_the_session(tmp_path, monkeypatch):
     engine, answers = make_engine(), queue.Queue[Any]()
-    boards = [Board(Board.memory(fields), fields) for fields in (SHOWN, HELD)]
+    boards = [Board(fields) for fields in (SHOWN, HELD)]
     loop: Any = engine_process._EngineLoop(*boards, queue.Queue(), answers)
     monkeypatch.setattr(loop, "_send_picture", lambda: None)
     usage = shutil.disk_usage(tmp_path)
@@ -274,6 +274,8 @@ def test_full_disk_ends_the_take_and_not_the_session(tmp_path, monkeypatch):
     assert "the disk is full (0 MB free); what was recorded until then is kept" in refused.text
     assert saved.folder == tmp_path / "second"
     assert not has_writer(tmp_path / "first" / RECORDING)
+    for board in boards:
+        board.close()
 
 
 def test_take_during_pause_leaves_no_folder(tmp_path):

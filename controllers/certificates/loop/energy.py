@@ -167,7 +167,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     river's force stays below `ceiling` [N]. The margin is the additional push that would be allowed [N].
     """
     moving = river.moving()
-    gain = peak_gain(SampledLoop(river.still(), river.sampling), river.k_r, river.b_d)
+    gain = peak_gain(river.loop(), river.k_r, river.b_d)
     pushed = PushedRiver(river, gain, float(own_force(river, moving).max()), ceiling)
     executed = injection(river, moving)
     allowed, (distance, felt) = pushed.most(), pushed.bounds(push)

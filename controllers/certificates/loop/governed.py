@@ -78,10 +78,10 @@ def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]
     river_with_damper = river._replace(law=with_damper(river.law, drag, river.k_r, river.b_d))
     worst, largest, worst_case = -1.0, float("inf"), (NO_HAND, 0)
     for hand in hands:
-        radius = SampledLoop(river_with_damper.still(hand), river.sampling).radius(river.k_r, river.b_d)
+        radius = river_with_damper.loop(hand).radius(river.k_r, river.b_d)
         if radius.max() > worst:
             worst, worst_case = float(radius.max()), (hand, int(radius.argmax()))
-        largest = min(largest, max_drag(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d))
+        largest = min(largest, max_drag(river.loop(hand), river.k_r, river.b_d))
     summary = f"governor of {drag:g} N s/m, certain up to {largest:.3g}"
     figures = {**alone.figures, "governor_drag": drag, "governor_certain": largest, "governor_radius": worst}
     assumptions = (

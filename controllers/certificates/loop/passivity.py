@@ -14,7 +14,6 @@ import numpy as np
 
 from controllers.certificates.loop.hand import MAX_STIFFNESS, HandImpedance
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
-from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import River, counterexample
 from controllers.certificates.report import Verdict
@@ -89,8 +88,7 @@ def passivity(river: River) -> Verdict:
         return Verdict("certified", reason, margin, assumptions, {}, figures)
     for stiffness in np.geomspace(10.0, MAX_STIFFNESS, 24):
         hand = HandImpedance(stiffness=float(stiffness))
-        loop = SampledLoop(river.still(hand), river.sampling)
-        radius = loop.radius(river.k_r, river.b_d)
+        radius = river.loop(hand).radius(river.k_r, river.b_d)
         if radius.max() > 1.0:
             example = counterexample(river, hand, int(radius.argmax()))
             reason += f"; a spring of {stiffness:.3g} N/m on the stylus makes it unstable"

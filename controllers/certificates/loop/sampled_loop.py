@@ -11,33 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import expm
 
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampling import Sampling
 from geometry.arrays import Array
 
-_PADE_ORDER = 6  # of the Padé approximant: exact to rounding for norms up to a half
 PLANT, UNDELAYED_SIZE = 6, 12  # sizes of (θ, θ̇), and of the state without delayed torques
-
-
-def exponentials(matrices: Array) -> Array:
-    """Exponentials of a stack of matrices (n, m, m), all at once: Padé's approximant, scaled and squared.
-
-    G. H. Golub and C. F. Van Loan, *Matrix Computations*, 4th ed. 2013, algorithm 9.3.1. `scipy.linalg.expm`, which the
-    tests compare it with, treats one matrix after the other.
-    """
-    squarings = max(0, 1 + int(np.ceil(np.log2(max(float(np.abs(matrices).sum(axis=2).max()), 1e-12)))))
-    scaled = matrices / 2.0**squarings
-    power = numerator = denominator = np.broadcast_to(np.eye(matrices.shape[1], dtype=np.float64), matrices.shape)
-    coefficient = 1.0
-    for k in range(1, _PADE_ORDER + 1):
-        coefficient *= (_PADE_ORDER - k + 1) / (k * (2 * _PADE_ORDER - k + 1))
-        power = scaled @ power
-        numerator, denominator = numerator + coefficient * power, denominator + (-1) ** k * coefficient * power
-    result = np.asarray(np.linalg.solve(denominator, numerator), dtype=np.float64)
-    for _ in range(squarings):
-        result = result @ result
-    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +57,7 @@ class SampledLoop:
         augmented[:, 3:6, :3] = -np.linalg.solve(linear.mass, linear.inverse_theta)
         augmented[:, 3:6, 3:6] = -np.linalg.solve(linear.mass, linear.inverse_rate)
         augmented[:, 3:6, 6:] = np.linalg.inv(linear.mass)
-        response = exponentials(augmented * duration)
+        response = np.asarray(expm(augmented * duration), dtype=np.float64)
         return response[:, :6, :6], response[:, :6, 6:]
 
     @cached_property

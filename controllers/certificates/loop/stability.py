@@ -69,6 +69,10 @@ class River(NamedTuple):
         slow_curve = Trajectory(times, curve.positions, periodic=curve.periodic, ends=curve.ends)
         return linearise(self.device, self.law, slow_curve, slow_phases, hand, self.width)
 
+    def loop(self, hand: HandImpedance = NO_HAND) -> SampledLoop:
+        """The sampled loop about rest on the curve (`still`)."""
+        return SampledLoop(self.still(hand), self.sampling)
+
 
 def _bracket_onset(stable: Mask, grid: Array) -> tuple[Array, Array]:
     """Grid neighbours between which each column of `stable`, (grid, n), first becomes false; inf if never."""
@@ -173,7 +177,7 @@ def _evaluate_hands(river: River, hands: Sequence[HandImpedance]) -> _HandResult
     """Evaluate the loop with every hand."""
     critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
     for hand in hands:
-        loop = SampledLoop(river.still(hand), river.sampling)
+        loop = river.loop(hand)
         critical.append(_critical_stiffness_near(loop, river))
         cut = max(cut, *(float(loop.radius(share * river.k_r, share * river.b_d).max()) for share in LIMITER_FACTORS))
         here, following = neighbours(loop.radius(river.k_r, river.b_d), river.curve.periodic)
@@ -240,7 +244,7 @@ def _reason_not_certified(river: River, found: _HandResults, least: float) -> st
 
 def _figures(river: River, found: _HandResults) -> dict[str, object]:
     """Figures of the verdict; radius, decay rate, critical damping and delay margin are for a stylus without a hand."""
-    unloaded = SampledLoop(river.still(), river.sampling)
+    unloaded = river.loop()
     radius = unloaded.radius(river.k_r, river.b_d)
     return {
         "phases": river.phases(),
@@ -266,7 +270,7 @@ def counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, obje
     at : int
         Index of the phase.
     """
-    state, growth = growing_mode(SampledLoop(river.still(hand), river.sampling), river.k_r, river.b_d, at)
+    state, growth = growing_mode(river.loop(hand), river.k_r, river.b_d, at)
     phase = float(river.phases()[at])
     return {"phase": phase, "p": river.curve.point(phase), "hand": hand, "state": state, "growth_rate": growth}
 
@@ -297,7 +301,7 @@ def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Ar
 
 def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
     """Stability boundary: critical k_r [N/m], the smallest over the phases, for each b_d in `damping` [N s/m]."""
-    loop = SampledLoop(river.still(hand), river.sampling)
+    loop = river.loop(hand)
 
     def critical(b_d: float) -> float:
         return float(_smallest_unstable(lambda k_r: loop.radius(k_r, b_d).max(keepdims=True), 1.0, MAX_STIFFNESS)[0])

@@ -196,7 +196,7 @@ def counterexample(
     place, along = curve.point(phase), curve.velocity(phase)
     before = phase - APPROACH_TIME if curve.periodic else max(phase - APPROACH_TIME, curve.start + 1e-3)
     at = int(np.argmin(np.abs(river.phases() - phase)))
-    loop, here = _at_phase(SampledLoop(river.still(), river.sampling), at), curve.point(river.phases()[at])
+    loop, here = _at_phase(river.loop(), at), curve.point(river.phases()[at])
     ahead = along / np.linalg.norm(along)
     aside = towards - ahead * (ahead @ towards)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-12)

@@ -90,16 +90,17 @@ def verdict_html(verdicts: tuple[GainVerdict, ...], checking: bool) -> str:
         return '<p style="margin:.5rem .75rem;color:#a8700a"><b>checking…</b></p>'
     blocks: list[str] = []
     for verdict in verdicts:
-        color, reason = COLORS[verdict.verdict], html.escape(verdict.reason)
-        margin = "" if verdict.margin is None else f" up to {verdict.margin + 1.0:.3g} times k_r"
-        passive = f"Passivity {html.escape(verdict.passive)}." if verdict.passive else ""
-        shown, details = (
-            ("", f"It {reason}. {passive}") if verdict.verdict == "certified" else (f"<br>{reason}.", passive)
-        )
+        stable, passive, margin = verdict.stability, verdict.passivity, ""
+        color, reason = COLORS[stable.verdict], f"{html.escape(stable.reason)}."
+        if stable.margin is not None and stable.verdict != "refuted":
+            margin = f" up to {stable.margin + 1.0:.3g} times k_r"
+        shown, details = ("", f"{reason} ") if stable.verdict == "certified" else (f"<br>{reason}", "")
+        if passive is not None:
+            details += f"Passivity {passive.verdict}: {html.escape(passive.reason)}."
         fold = f'<details><summary style="cursor:pointer">why</summary>{details}</details>' if details else ""
         blocks.append(
-            f'<div class="verdict-{verdict.verdict}" style="margin:.4rem .75rem;padding:.2rem .6rem;font-size:.8rem;'
+            f'<div class="verdict-{stable.verdict}" style="margin:.4rem .75rem;padding:.2rem .6rem;font-size:.8rem;'
             f'border-left:6px solid {color}"><b style="color:{color}">{html.escape(verdict.law)}: '
-            f"{_WORDS[verdict.verdict]}</b>{margin}{' · checking…' if checking else ''}{shown}{fold}</div>"
+            f"{_WORDS[stable.verdict]}</b>{margin}{' · checking…' if checking else ''}{shown}{fold}</div>"
         )
     return "".join(blocks)

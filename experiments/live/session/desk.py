@@ -72,9 +72,9 @@ class Desk:
         while (answer := self.engine.answer()) is not None:
             self._process_answer(answer)
         while (verdict := self._verdicts.answer()) is not None:
-            config, now, is_pending = verdict
+            config, now = verdict
             if config == self.config:
-                self.verdict, self.checking = now, is_pending
+                self.verdict, self.checking = now, False
         if self._preparation is not None and (uploaded := self._preparation.answer()) is not None:
             self._add_clip(uploaded)
         if not self.engine.alive:

@@ -40,11 +40,10 @@ class EngineProcess(PageProcess):
     """The page's handle of the engine's process: boards to read and write, and a queue in each direction."""
 
     def __init__(self) -> None:
-        shown, held = messages.Board.memory(messages.SHOWN), messages.Board.memory(messages.HELD)
-        self.shown, self.held = messages.Board(shown, messages.SHOWN), messages.Board(held, messages.HELD)
+        self.shown, self.held = messages.Board(messages.SHOWN), messages.Board(messages.HELD)
         self.held.write({"pace": 1.0})
         # Not a daemon, as it starts compiler processes.
-        super().__init__(_main, (shown, held), daemon=False, name="hvf-servo")
+        super().__init__(_main, (self.shown, self.held), daemon=False, name="hvf-servo")
 
     def close(self) -> None:
         """End the process; a take in progress is saved."""
@@ -54,10 +53,12 @@ class EngineProcess(PageProcess):
             self._process.kill()
             self._process.join()
         self._close_queues()
+        self.shown.close()
+        self.held.close()
 
 
-def _main(shown: Any, held: Any, orders: Any, answers: Any) -> None:
-    _EngineLoop(messages.Board(shown, messages.SHOWN), messages.Board(held, messages.HELD), orders, answers).run()
+def _main(shown: messages.Board, held: messages.Board, orders: Any, answers: Any) -> None:
+    _EngineLoop(shown, held, orders, answers).run()
 
 
 class _EngineLoop:
@@ -78,7 +79,7 @@ class _EngineLoop:
         elapsed = 0.0
         while self._is_running and os.getppid() == self._parent:
             self._process_orders()
-            held = self._held.rows
+            held = self._held.read()
             engine = self._engine
             paused, steps = held["paused"][0] > 0.0, held["steps"][0]
             # Nothing is measured, or shown in its place, before the first block: it runs even while time is paused.
@@ -105,8 +106,8 @@ class _EngineLoop:
             self._stop(self._engine)
 
     def _update_drag(self, engine: Engine) -> None:
-        held = self._held.rows
-        engine.drag = Drag(held["target"].copy(), held["pressed"][0] > 0.0) if held["grip"][0] > 0.0 else None
+        held = self._held.read()
+        engine.drag = Drag(held["target"], held["pressed"][0] > 0.0) if held["grip"][0] > 0.0 else None
 
     def _run_block(self, engine: Engine) -> None:
         self._update_drag(engine)

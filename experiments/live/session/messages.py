@@ -1,18 +1,18 @@
 """Messages between the page and the engine's process, and the shared boards of values that change continuously."""
 
 import itertools
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from experiments.config.run_config import RunConfig
 from geometry.arrays import Array
+from sim.hardware.shared import SharedNumbers
 from sim.viewer.shown import COURSE_POINTS
 
 SLICE_SIDE = 9  # points along each side of the field's slice
@@ -121,54 +121,43 @@ class Saved:
     lines: tuple[str, ...]
 
 
-_MAX_RETRY_TIME = 1.0  # [s] of a reader; a write is much shorter
-
-
 class Board:
-    """Named rows of numbers in shared memory, with one writer.
-
-    A sequence lock: the sequence number is odd during a write, and a reader retries if the number was odd or
-    changed during the read (Lamport 1977, "Concurrent reading and writing").
+    """Named rows of numbers in shared memory, with one writer; passed to another process as an argument.
 
     Parameters
     ----------
-    memory : ctypes array of double
-        Memory from `Board.memory`.
     sizes : Mapping
         Number of values of each row, by name.
+    shared : SharedNumbers, optional
+        Existing memory of these rows; by default new memory is created.
+
+    Attributes
+    ----------
+    rows : dict of Array
+        The rows as this process last wrote or read them.
     """
 
-    def __init__(self, memory: Any, sizes: Mapping[str, int]):
-        self._values: Array = np.frombuffer(memory, dtype=np.float64)
-        starts = itertools.accumulate(sizes.values(), initial=1)
-        self.rows = {name: self._values[a : a + n] for (name, n), a in zip(sizes.items(), starts, strict=False)}
+    def __init__(self, sizes: Mapping[str, int], shared: SharedNumbers | None = None):
+        self._sizes, self._numbers = sizes, np.zeros(sum(sizes.values()))
+        self._shared = shared or SharedNumbers(len(self._numbers))
+        starts = itertools.accumulate(sizes.values(), initial=0)
+        self.rows = {name: self._numbers[a : a + n] for (name, n), a in zip(sizes.items(), starts, strict=False)}
 
-    @staticmethod
-    def memory(sizes: Mapping[str, int]) -> Any:
-        """Memory for a board, to be passed to a process when it is started."""
-        from multiprocessing import get_context
-
-        return get_context("spawn").RawArray("d", 1 + sum(sizes.values()))
-
-    @property
-    def sequence(self) -> int:
-        """Sequence number, which changes with every write."""
-        return int(self._values[0])
+    def __reduce__(self) -> tuple[type[Self], tuple[Mapping[str, int], SharedNumbers]]:
+        return type(self), (self._sizes, self._shared)
 
     def write(self, values: Mapping[str, npt.ArrayLike]) -> None:
         """Write some rows; a value shorter than its row leaves the rest of the row unchanged."""
-        self._values[0] += 1.0
         for name, value in values.items():
             row = np.ravel(np.asarray(value, dtype=np.float64))
             self.rows[name][: len(row)] = row
-        self._values[0] += 1.0
+        self._shared.write(self._numbers)
 
     def read(self) -> dict[str, Array]:
-        """A consistent copy of all rows; if the writer died during a write, the rows as they are."""
-        end = time.monotonic() + _MAX_RETRY_TIME
-        while True:
-            before = self._values[0]
-            rows = {name: row.copy() for name, row in self.rows.items()}
-            if (before % 2.0 == 0.0 and before == self._values[0]) or time.monotonic() > end:
-                return rows
-            time.sleep(0.0)
+        """A copy of all rows as they were written together."""
+        self._shared.read(self._numbers)
+        return {name: row.copy() for name, row in self.rows.items()}
+
+    def close(self) -> None:
+        """Unmap the memory; the board that created it also removes it."""
+        self._shared.close()

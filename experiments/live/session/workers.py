@@ -8,6 +8,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from experiments.live.session.gain_verdict import gain_verdicts
 from models.errors import ModelError
 from sim.hardware.process_start import parent_id, start_without_sigint
 
@@ -104,15 +105,9 @@ def newest(requests: Any) -> Any:
 
 
 def verdicts(requests: Any, answers: Any) -> None:
-    """Worker for verdicts on gains: answers (configuration, verdicts, whether more will follow) to a configuration."""
-    from experiments.live.session.gain_verdict import GainVerdicts  # CasADi is imported here, not in the page's process
-
-    gain_verdicts = GainVerdicts()
+    """Worker for verdicts on gains: answers (configuration, verdicts) to a configuration."""
     while (config := newest(requests)) is not None:
-        for k, now in enumerate(gain_verdicts.of(config)):
-            answers.put((config, now, k == 0 and now[0].verdict == "certified"))
-            if not requests.empty():
-                break  # the slider has moved on
+        answers.put((config, gain_verdicts(config)))
 
 
 class Uploaded(NamedTuple):

@@ -1,11 +1,9 @@
 """Speeds along a curve at which the flights of its animation are ballistic enough, and a field that governs them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from controllers.curves.trajectory import Trajectory
-from controllers.fields.algebra.law import Law, Program
+from controllers.fields.algebra.law import Law
 from controllers.fields.governor import Governor
 from controllers.haptic_map.animation import ClipMap
 from controllers.haptic_map.river_clips import RiverClips
@@ -104,15 +102,4 @@ def governed(governor: SpeedGovernor | None, law: Law, course: Trajectory, maps:
         return law, 0.0
     speeds = speeds_along(maps, maps.curve, course=course)
     added = Governor(course, speeds, governor.governor_drag, maps.reach)
-    return Governed(law, added), float(speeds[:, 0].max())
-
-
-@dataclass(frozen=True, eq=False)
-class Governed(Law):
-    """Sum of a field along a curve and the governor for the animation along it."""
-
-    field: Law
-    governor: Governor
-
-    def _compose(self) -> Program:
-        return self.field + self.governor
+    return law + added, float(speeds[:, 0].max())

@@ -22,7 +22,6 @@ from experiments.setups.session import Session
 from experiments.setups.wiring import Ready, wire
 from experiments.trials.trial.measures import TrialLog, measure_trial
 from sim.loop.channels import groups, record_into
-from sim.loop.loop import Loop
 from sim.recording.recorder import DiskFull, Recorder
 
 State = Literal["done", "failed"]
@@ -135,15 +134,13 @@ def _run_trial(config: RunConfig, task: Task, maps: MapCache) -> dict[str, float
 
 
 def _simulate(config: RunConfig, session: Session, log: TrialLog) -> dict[str, float]:
-    laws = session.parts.program.python_laws
-    Loop(session.servo, session.world, log, python_laws=laws).run(config.seconds)
+    session.loop(log).run(config.seconds)
     return measure_trial(config, session, log)
 
 
 def run_recorded(config: RunConfig, session: Session, log: TrialLog, folder: Path) -> dict[str, float]:
     """Run a trial, record it into an existing folder, and measure it."""
-    servo, laws = session.servo, session.parts.program.python_laws
-    static = session.static()
+    servo, static = session.servo, session.static()
     with Recorder(folder / RECORDING, to_dict(config), config.seed, groups(servo, session.world), static) as recorder:
         record = record_into(recorder, servo, session.world)
 
@@ -151,7 +148,7 @@ def run_recorded(config: RunConfig, session: Session, log: TrialLog, folder: Pat
             log(ticks, frames, n)
             record(ticks, frames, n)
 
-        Loop(servo, session.world, observe, python_laws=laws).run(config.seconds)
+        session.loop(observe).run(config.seconds)
         measures = measure_trial(config, session, log)
         recorder.close({"lines": [], "measures": measures})
     return measures

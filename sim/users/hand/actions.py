@@ -3,18 +3,28 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
 
 from controllers.checks import check_field_types
-from geometry.arrays import Array
 from sim.errors import SimError
 
-_PUSH_COLUMNS, _TURN_COLUMNS = 11, 5
-GRAB_COLUMNS = 11
-"""Columns of a `grab_table`."""
+Records = npt.NDArray[Any]
+"""Actions for the compiled hand, shape (n,), which reads their fields by name: times [s], forces [N], places [m]."""
+
+# With outward 1 a push has no direction of its own, with a radius of 0 it begins at any place.
+_PUSH = np.dtype([
+    ("start", "f8"), ("duration", "f8"), ("peak", "f8"), ("direction", "f8", 3), ("outward", "f8"), ("place", "f8", 3),
+    ("radius", "f8"),
+])  # fmt: skip
+GRAB = np.dtype([
+    ("start", "f8"), ("reach", "f8"), ("place", "f8", 3), ("carry", "f8", 3), ("duration", "f8"), ("hold", "f8"),
+    ("steady", "f8"),
+])  # fmt: skip
+"""A grab for the compiled hand; a place of NaN is the hand's own position, and steady is 0 or 1."""
+_TURN = np.dtype([("start", "f8"), ("duration", "f8"), ("peak", "f8", 3)])
 
 
 def _values(vector: Sequence[float] | None) -> Sequence[float]:
@@ -68,36 +78,16 @@ class Push:
         if self.direction is not None and np.linalg.norm(self.direction) < 1e-12:
             raise SimError(f"the direction of a push has no length: {self.direction}")
 
-    def row(self) -> Array:
-        """The push as numbers for the compiled hand, shape (11,)."""
+    def record(self) -> tuple[object, ...]:
+        """The push for the compiled hand."""
         direction = np.zeros(3) if self.direction is None else np.array(self.direction) / np.linalg.norm(self.direction)
         place, radius = (np.zeros(3), 0.0) if self.place is None else (np.array(self.place), self.radius)
-        outward = float(self.direction is None)
-        return np.array([self.at, self.seconds, self.force, *direction, outward, *place, radius])
+        return self.at, self.seconds, self.force, direction, self.direction is None, place, radius
 
 
-def push_table(pushes: Sequence[Push]) -> Array:
-    """Rows of all pushes for `push_at`, shape (n, 11)."""
-    return np.array([push.row() for push in pushes]).reshape(len(pushes), _PUSH_COLUMNS)
-
-
-class PushRow(NamedTuple):
-    """A `Push` in compiled code: times [s], peak [N], place and radius [m]; a radius of 0 means any place."""
-
-    start: float
-    duration: float
-    peak: float
-    direction: Array
-    outward: float
-    place: Array
-    radius: float
-
-
-@njit
-def push_at(pushes: Array, i: int) -> PushRow:
-    """Push i of a `push_table`."""
-    row = pushes[i]
-    return PushRow(row[0], row[1], row[2], row[3:6], row[6], row[7:10], row[10])
+def push_table(pushes: Sequence[Push]) -> Records:
+    """All pushes for the compiled hand."""
+    return np.array([push.record() for push in pushes], _PUSH)
 
 
 @dataclass(frozen=True)
@@ -156,14 +146,14 @@ class Grab:
         """Time at which the switch is released [s]."""
         return self.at + (0.0 if self.place is None else self.reach) + self.seconds + self.hold
 
-    def row(self) -> Array:
-        """The grab as numbers for the compiled hand, shape (11,)."""
-        place, reach = (np.full(3, np.nan), 0.0) if self.place is None else (np.array(self.place), self.reach)
-        return np.array([self.at, reach, *place, *self.carry, self.seconds, self.hold, float(self.steady)])
+    def record(self) -> tuple[object, ...]:
+        """The grab for the compiled hand, a `GRAB`."""
+        place, reach = (np.full(3, np.nan), 0.0) if self.place is None else (self.place, self.reach)
+        return self.at, reach, place, self.carry, self.seconds, self.hold, self.steady
 
 
-def grab_table(grabs: Sequence[Grab]) -> Array:
-    """Rows of all grabs for `grab_at`, by starting time, shape (n, 11).
+def grab_table(grabs: Sequence[Grab]) -> Records:
+    """All grabs for the compiled hand, by starting time.
 
     Raises
     ------
@@ -174,26 +164,7 @@ def grab_table(grabs: Sequence[Grab]) -> Array:
     for before, after in itertools.pairwise(ordered):
         if after.at < before.end:
             raise SimError(f"a grab begins at {after.at:g} s, before another has ended at {before.end:g} s")
-    return np.array([grab.row() for grab in ordered]).reshape(len(ordered), GRAB_COLUMNS)
-
-
-class GrabRow(NamedTuple):
-    """A `Grab` in compiled code: times [s], place (NaN: the hand's position) and carry [m]; steady is 0 or 1."""
-
-    start: float
-    reach: float
-    place: Array
-    carry: Array
-    duration: float
-    hold: float
-    steady: float
-
-
-@njit
-def grab_at(grabs: Array, i: int) -> GrabRow:
-    """Grab i of a `grab_table`."""
-    row = grabs[i]
-    return GrabRow(row[0], row[1], row[2:5], row[5:8], row[8], row[9], row[10])
+    return np.array([grab.record() for grab in ordered], GRAB)
 
 
 @dataclass(frozen=True)
@@ -235,26 +206,11 @@ class Turn:
         if np.linalg.norm(self.axis) < 1e-12:
             raise SimError(f"the axis of a turn has no length: {self.axis}")
 
-    def row(self) -> Array:
-        """The turn as numbers for the compiled hand, shape (5,)."""
-        return np.array([self.at, self.seconds, *(self.angle * np.array(self.axis) / np.linalg.norm(self.axis))])
+    def record(self) -> tuple[object, ...]:
+        """The turn for the compiled hand: times [s], and the rotation vector at its peak [rad]."""
+        return self.at, self.seconds, self.angle * np.array(self.axis) / np.linalg.norm(self.axis)
 
 
-def turn_table(turns: Sequence[Turn]) -> Array:
-    """Rows of all turns for `turn_at`, shape (n, 5)."""
-    return np.array([turn.row() for turn in turns]).reshape(len(turns), _TURN_COLUMNS)
-
-
-class TurnRow(NamedTuple):
-    """A `Turn` in compiled code: times [s], and the rotation vector at its peak [rad]."""
-
-    start: float
-    duration: float
-    peak: Array
-
-
-@njit
-def turn_at(turns: Array, i: int) -> TurnRow:
-    """Turn i of a `turn_table`."""
-    row = turns[i]
-    return TurnRow(row[0], row[1], row[2:5])
+def turn_table(turns: Sequence[Turn]) -> Records:
+    """All turns for the compiled hand."""
+    return np.array([turn.record() for turn in turns], _TURN)

@@ -12,18 +12,18 @@ from geometry.arrays import Array
 from geometry.easing import smooth_step, smooth_step_slope
 from models.phantom.parameters import MIN_TIP_MASS, PREMIUM_1_5
 from sim.errors import SimError
-from sim.users.hand.actions import Grab, Push, Turn, grab_at, grab_table, push_at, push_table, turn_table
+from sim.users.hand.actions import Grab, Push, Records, Turn, grab_table, push_table, turn_table
 
 _STYLUS_INERTIA = min(PREMIUM_1_5.gimbal_inertia)  # [kg m²]
 
 
 @njit
-def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) -> None:
+def push_force(pushes: Records, begun: Array, t: float, p: Array, force: Array) -> None:
     """Add the pushes active at time t to a force.
 
     Parameters
     ----------
-    pushes : Array
+    pushes : Records
         A `sim.users.hand.actions.push_table` of n pushes.
     begun : Array
         When each push began [s], NaN if it has not; shape (n,), updated.
@@ -35,7 +35,7 @@ def push_force(pushes: Array, begun: Array, t: float, p: Array, force: Array) ->
         Added to [N], in H, shape (3,).
     """
     for i in range(pushes.shape[0]):
-        push = push_at(pushes, i)
+        push = pushes[i]
         if math.isnan(begun[i]):
             x, y, z = p[0] - push.place[0], p[1] - push.place[1], p[2] - push.place[2]
             distance = math.sqrt(x**2 + y**2 + z**2)
@@ -90,7 +90,7 @@ def arm_force(
 
 @njit
 def grab_force(
-    stiffness: float, damping: float, grabs: Array, held: Array, t: float, p: Array, v: Array, force: Array
+    stiffness: float, damping: float, grabs: Records, held: Array, t: float, p: Array, v: Array, force: Array
 ) -> float:
     """Add the force of an arm in a grab at time t, k (p_d − p) + b (ṗ_d − v), and return the switch.
 
@@ -100,7 +100,7 @@ def grab_force(
     ----------
     stiffness, damping : float
         k [N/m], b [N s/m].
-    grabs : Array
+    grabs : Records
         A `sim.users.hand.actions.grab_table` of n grabs.
     held : Array
         Position of the hand when each grab began [m], NaN if it has not; shape (n, 3), updated.
@@ -113,7 +113,7 @@ def grab_force(
         1 while the switch is pressed, else 0.
     """
     for i in range(grabs.shape[0]):
-        grab = grab_at(grabs, i)
+        grab = grabs[i]
         pressed_at = grab.start + grab.reach
         if not grab.start <= t < pressed_at + grab.duration + grab.hold:
             continue
@@ -149,14 +149,14 @@ class CompiledArm(NamedTuple):
     damping: float
     path: Array
     period: float
-    pushes: Array
+    pushes: Records
     push_start_times: Array
-    grabs: Array
+    grabs: Records
     held: Array
     switch: Array
     turn_stiffness: float
     turn_damping: float
-    turns: Array
+    turns: Records
 
 
 @njit

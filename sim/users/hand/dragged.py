@@ -10,7 +10,7 @@ law is the same as for every simulated hand.
 import numpy as np
 
 from geometry.arrays import Array
-from sim.users.hand.actions import GRAB_COLUMNS
+from sim.users.hand.actions import GRAB
 from sim.users.hand.arm import CompiledArm
 
 _SAMPLE_SPACING = 1e6  # [s] between the two samples of a path, longer than any run
@@ -24,7 +24,7 @@ TREMOR_AMPLITUDE = 1e-4
 def relaxed(arm: CompiledArm) -> CompiledArm:
     """The arm of a hand that has released the stylus and its switch."""
     arm.switch[0] = 0.0
-    return arm._replace(path=np.zeros((0, 3)), grabs=np.zeros((0, GRAB_COLUMNS)), held=np.zeros((0, 3)))
+    return arm._replace(path=np.zeros((0, 3)), grabs=np.zeros(0, GRAB), held=np.zeros((0, 3)))
 
 
 def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array, pressed: bool) -> CompiledArm:
@@ -43,9 +43,10 @@ def dragged(arm: CompiledArm, t: float, seconds: float, start: Array, end: Array
     """
     carry = np.asarray(end, dtype=np.float64) - start
     if pressed:
-        # A grab at a place that is reached at once, [at, reach, place, carry, seconds, hold, steady].
-        row = np.array([[t, 0.0, *start, *carry, seconds, _ENDLESS_HOLD, 1.0]])
-        return arm._replace(path=np.zeros((0, 3)), grabs=row, held=np.full((1, 3), np.nan))
+        grab = np.array(
+            [(t, 0.0, start, carry, seconds, _ENDLESS_HOLD, 1.0)], GRAB
+        )  # at a place that is reached at once
+        return arm._replace(path=np.zeros((0, 3)), grabs=grab, held=np.full((1, 3), np.nan))
     speed = carry / seconds
     first = start - speed * t
     return relaxed(arm)._replace(path=np.array([first, first + _SAMPLE_SPACING * speed]), period=_SAMPLE_SPACING)

@@ -7,23 +7,23 @@ from numba import njit
 from controllers.work_array import work_array
 from geometry.arrays import Array
 from geometry.rotations import angular_velocity, exponential, logarithm, multiply
-from sim.users.hand.actions import turn_at
+from sim.users.hand.actions import Records
 
 
 @njit
-def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
+def wanted_turn(turns: Records, t: float, turn: Array, rate: Array) -> None:
     """Set the rotation vector r [rad] of the intended orientation at time t, and ṙ [rad/s], shape (3,) each.
 
     Parameters
     ----------
-    turns : Array
+    turns : Records
         A `sim.users.hand.actions.turn_table`.
     t, turn, rate
         Time [s] and results, in H.
     """
     turn[:], rate[:] = 0.0, 0.0
     for i in range(turns.shape[0]):
-        wanted = turn_at(turns, i)
+        wanted = turns[i]
         phase = math.pi * (t - wanted.start) / wanted.duration
         if 0.0 < phase < math.pi:
             share, change = math.sin(phase) ** 2, math.pi / wanted.duration * math.sin(2.0 * phase)
@@ -33,15 +33,17 @@ def wanted_turn(turns: Array, t: float, turn: Array, rate: Array) -> None:
 
 
 @njit
-def turning_moment(stiffness: float, damping: float, turns: Array, t: float, q: Array, w: Array, moment: Array) -> None:
+def turning_moment(
+    stiffness: float, damping: float, turns: Records, t: float, q: Array, w: Array, moment: Array
+) -> None:
     r"""Set the moment of fingers that hold the stylus at the intended orientation R_d: k log(R_d Rᵀ) + b (ω_d − ω).
 
     Parameters
     ----------
     stiffness, damping : float
         k [N m/rad], b [N m s/rad].
-    turns : Array
-        Rows of `sim.users.hand.actions.turn_table`, shape (n, 5).
+    turns : Records
+        A `sim.users.hand.actions.turn_table`.
     t : float
         Time [s].
     q, w : Array

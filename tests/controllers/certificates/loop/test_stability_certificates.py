@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 
 from controllers.certificates.loop.energy import distance_bound, energy, peak_gain, terminal_speed
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance, HandRange
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, HOLD_LAW, SEEK_LAW, follow_law
 from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.passivity import damping_needed, passivity
-from controllers.certificates.loop.sampled_loop import SampledLoop, exponentials
+from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import (
     River,
@@ -328,11 +327,3 @@ def test_linearise_raises_curve_error_where_the_curve_stands_still():
 def test_out_of_range_parameters_raise_parameter_error(construct):
     with pytest.raises(ParameterError):
         construct()
-
-
-@pytest.mark.parametrize("size", [1e-9, 0.01, 0.5, 5.0, 30.0])
-def test_exponentials_of_a_stack_match_scipy(size: float) -> None:
-    matrices = size * np.random.default_rng(3).normal(size=(20, 9, 9))
-    expected = np.array([expm(one) for one in matrices])
-    off = np.abs(exponentials(matrices) - expected).max(axis=(1, 2)) / np.abs(expected).max(axis=(1, 2))
-    assert off.max() < 1e-11

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
+from controllers.fields.governor import Governor
 from experiments.config.options import run_config
 from experiments.flights.ballistics import clip_ballistics
 from experiments.setups.parts.clips import load_clips
-from experiments.setups.parts.governor import Governed, animation_along
+from experiments.setups.parts.governor import animation_along
 from experiments.setups.parts.lap import DEFAULT_LAP
 from experiments.setups.wiring import wire
 from experiments.studies.rate_trials import DRAG, LedBackflip
@@ -58,8 +59,8 @@ def test_hand_that_slows_down_in_flight_meets_a_force(backflip):
 def test_governor_speeds_follow_the_animation_of_the_run():
     config = run_config(clips=("backflip",), governor=True, seconds=1.0)
     session = wire(config)
-    assert isinstance(session.field, Governed)
-    maps, governor = session.parts.maps, session.field.governor
+    maps = session.parts.maps
+    (governor,) = (law for law in session.field.program().laws if isinstance(law, Governor))
     # At the clips' own pace, not at that of the lap or of the friction-compensated curve.
     pace, shares = maps.curve.length / maps.lap_seconds, np.linspace(0.0, 1.0, len(governor.speeds))
     assert maps.lap_seconds != pytest.approx(DEFAULT_LAP, rel=0.1)
