@@ -281,9 +281,10 @@ def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
 
 
 def shape_remarks(taken: Mapping[str, str]) -> Iterator[str]:
-    """The joints that were recognised by the shape of the body."""
-    which = ", ".join(f"{joint} as {body}" for body, joint in taken.items())
-    yield f"the names of the joints do not say what they are, the body's shape does: {which}; --roles FILE overrules"
+    """Where limbs and head begin in a skeleton that was recognised by its shape."""
+    begins = ("left_thigh", "right_thigh", "left_upper_arm", "right_upper_arm", "head")
+    which = ", ".join(f"{taken[body]} as {body}" for body in begins if body in taken)
+    yield f"the joints are recognised by the shape of the body, not by their names: {which}; --roles FILE overrules"
 
 
 def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> Iterator[str]:
