@@ -22,8 +22,8 @@ from tests.models.mocap.retargeting.creatures import (
     with_skirt,
     without,
 )
+from tests.models.mocap.retargeting.posed_clips import posed
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, largest_angle, random_rig, write_rig
-from tests.models.mocap.retargeting.test_rigs import posed
 
 JOINT = re.compile(r"(?<=ROOT |OINT )\S.*")
 PARTS = "Hips Spine Spine4 Neck Head @Shoulder @Arm @ForeArm @Hand @UpLeg @Leg @Foot @ToeBase"
