@@ -31,7 +31,7 @@ from models.mocap.retargeting.limbs_by_shape import (
 )
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry, assembled, joints_below, names_of
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import check_biped, check_sides, side_evidence, up_axis
+from models.mocap.retargeting.upright import AXES, check_biped, check_sides, side_evidence, up_axis
 
 _MAX_PAIR_COUNT = 24  # of pairs of limbs that are tried: captures have up to 10
 # Lengths over that of thigh and shank: 0.13 to 0.22, 0.23 to 0.47 and 0.48 to 0.62 in captures.
@@ -120,9 +120,12 @@ def _body_roles(
     check_bones(motion, roles, positions)
     check_biped(motion, lines)
     body = joints_below(roles.segments["pelvis"], motion.parents)
-    vertical = up_axis(motion, roles, lines, positions[:, body], up).axis
+    vertical = up_axis(motion, roles, lines, positions[:, body], up)
+    # With arms longer than legs, these seem to be exchanged, in a body that hangs upside down.
+    if np.isfinite(vertical.confidence) and not any((vertical.axis == AXES[name]).all() for name in ("+Y", "+Z")):
+        raise _Unclear("up would be an axis that programs do not write: --up states it")
     check_sides(motion, lines)
-    if np.quantile(unit(lines.trunk) @ vertical, 0.8) < _MIN_STANDING_COSINE:
+    if np.quantile(unit(lines.trunk) @ vertical.axis, 0.8) < _MIN_STANDING_COSINE:
         raise _Unclear("its trunk is hardly ever upright")
     names = names_of(motion.joints)
     for role, joint in named.items():
@@ -190,10 +193,13 @@ def _arm_roles(side: str, arm: Limb, tree: Tree) -> dict[str, int]:
 
 
 def _head(tree: Tree, legs: LimbPair, arms: LimbPair, still: frozenset[int]) -> int | None:
-    """The last joint that moves in the only chain from the chest up, before it forks (eyes, hair); None if unclear."""
+    """The last joint that moves in the only chain from the chest up, before it forks (eyes, hair); None if unclear.
+
+    A chain upwards is there in any case: without, legs and arms may be exchanged.
+    """
     hips, shoulders = (tree.places[:, [limb.ends[0] for limb in pair.limbs]].mean(axis=1) for pair in (legs, arms))
     up, taken = unit(shoulders - hips), legs.nodes | arms.nodes
-    found: list[int] = []
+    found, rises = list[int](), False
     for start in tree.joints_at(arms.fork):
         if not taken.isdisjoint(joints_below(start, tree.parents)):
             continue
@@ -201,9 +207,13 @@ def _head(tree: Tree, legs: LimbPair, arms: LimbPair, still: frozenset[int]) -> 
         while len(beyond := _far_children(chain[-1], tree)) == 1:
             chain += beyond
         moving = [joint for joint in chain if joint not in still] or chain[:1]
-        height = np.median(np.sum((tree.places[:, moving[-1]] - shoulders) * up, axis=1))
-        if len(moving) <= _MAX_NECK_JOINTS and height > -_MAX_HEAD_DEPTH * legs.length:
+        heights = np.median(np.sum((tree.places[:, chain] - shoulders[:, None]) * up[:, None], axis=2), axis=0)
+        high = [joint for joint, height in zip(chain, heights, strict=True) if height > -_MAX_HEAD_DEPTH * legs.length]
+        rises |= bool(high)
+        if moving[-1] in high and len(moving) <= _MAX_NECK_JOINTS:
             found.append(moving[-1])
+    if not rises:
+        raise _Unclear("nothing above its shoulders might be a head")
     return found[0] if len(found) == 1 else None
 
 

@@ -8,6 +8,7 @@ import pytest
 from models.mocap.library import load
 from models.mocap.readers.formats import READABLE_SUFFIXES, read_motion
 from models.mocap.readers.motion_file import MotionFileError
+from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.roles_by_shape import roles_by_shape
 from models.mocap.retargeting.skeleton_roles import roles_of
 from tests.models.mocap.retargeting.creatures import (
@@ -163,6 +164,24 @@ def test_head_with_a_ponytail_is_reported_as_missing_and_not_guessed(tmp_path):
     assert "chest" in roles.segments
 
 
+def test_body_without_a_head_is_refused(tmp_path):
+    assert roles_by_shape(human(without=("neck", "head"))(tmp_path)) == "nothing above its shoulders might be a head"
+
+
+@pytest.mark.parametrize("name", ["walk", "ginga", "backflip"])
+def test_arms_longer_than_legs_are_not_taken_for_these(name, tmp_path):
+    body = human(name, proportions={"arm": 1.3, "leg": 0.5})(tmp_path)
+    assert isinstance(roles_by_shape(body), str)
+    assert isinstance(roles_by_shape(grow(body, "Hips", [(-10, 0, -10)] * 3)), str)  # nor with a tail for a head
+
+
+@pytest.mark.parametrize("up", ["+X", "-Y", "-Z"])
+def test_vertical_that_programs_do_not_write_has_to_be_stated(up, tmp_path):
+    body = human(up=up)(tmp_path)
+    assert roles_by_shape(body) == "up would be an axis that programs do not write: --up states it"
+    assert roles_by_shape(body, up) == roles_of(body.joints, body.parents)
+
+
 def test_knees_that_bend_back_do_not_decide_which_side_is_left(tmp_path):
     turns = (("thigh", 30.0), ("shank", -70.0), ("foot", 40.0))
     back = [(f"{side}_{part}", "y", angle) for side in ("left", "right") for part, angle in turns]
@@ -221,14 +240,15 @@ def compare_random_rigs(n, seed, folder):
     for k in range(n):
         rig, clip = random_rig(rng), clips[int(rng.integers(len(clips)))]
         write_rig(rig, clip, folder / "r.bvh")
+        hints = Hints(up=None if rig.up in ("+Y", "+Z") else rig.up)
         try:
-            named = load(folder / "r.bvh")
+            named = load(folder / "r.bvh", hints)
             numbers = rng.permutation(1000)
             rename(folder / "r.bvh", lambda j, _, numbers=numbers: f"Bone.{numbers[j]:03d}")
         except MotionFileError:
             continue
         try:
-            numbered = load(folder / "r.bvh")
+            numbered = load(folder / "r.bvh", hints)
         except MotionFileError as error:
             refused.append((k, str(error)))
             continue
@@ -246,7 +266,7 @@ def test_eight_random_rigs_with_numbers_for_names_give_the_same_motion(tmp_path)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_many_random_rigs_with_numbers_for_names_give_the_same_motion(seed, tmp_path):
-    """Refused are arms as long as legs, and bodies without toes whose arms do not show where they face."""
+    """Refused are most of those with arms as long as legs or without hands, heads or toes: a fifth."""
     wrong, refused = compare_random_rigs(50, 200 + seed, tmp_path)
     assert not wrong
-    assert len(refused) <= 15, refused
+    assert len(refused) <= 20, refused
