@@ -33,7 +33,8 @@ from models.mocap.retargeting.skeleton_roles import Roles, ancestry, assembled, 
 from models.mocap.retargeting.straight_bones import check_bones
 from models.mocap.retargeting.upright import AXES, check_biped, check_sides, side_evidence, up_axis
 
-_MAX_PAIR_COUNT = 24  # of pairs of limbs that are tried: captures have up to 10
+_MAX_PAIR_COUNT = 24  # of pairs of limbs: captures have up to 4
+_SEVERAL = "several limbs might be its legs or arms"
 # Lengths over that of thigh and shank: 0.13 to 0.22, 0.23 to 0.47 and 0.48 to 0.62 in captures.
 _HIP_RATIOS, _SHOULDER_RATIOS, _TRUNK_RATIOS = (0.08, 0.5), (0.2, 0.9), (0.35, 1.1)
 # Length of the legs over that of others that make a body, and of the arms over that of limbs that are neither.
@@ -68,9 +69,11 @@ def roles_by_shape(motion: SourceMotion, up: str | None = None) -> Roles | str:
     positions = motion.global_positions(rotations)
     tree = tree_of(motion, positions, rotations)
     pairs = limb_pairs(tree)
+    if len(pairs) > _MAX_PAIR_COUNT:
+        return _SEVERAL
     found: dict[frozenset[int], tuple[float, LimbPair, LimbPair, Roles]] = {}
     reasons: list[tuple[float, str]] = []
-    for legs, arms in permutations(pairs, 2) if len(pairs) <= _MAX_PAIR_COUNT else ():
+    for legs, arms in permutations(pairs, 2):
         least, most = (ratio * legs.length for ratio in ARM_RATIOS)
         if legs.fork == arms.fork or legs.nodes & arms.nodes or not least < arms.length < most:
             continue
@@ -91,7 +94,7 @@ def roles_by_shape(motion: SourceMotion, up: str | None = None) -> Roles | str:
     free = [pair.length for pair in pairs if pair.nodes.isdisjoint(legs.nodes | arms.nodes)]
     longest_free, next_leg = max(free, default=0.0), max((other.length for _, other, *_ in others), default=0.0)
     if longest_free * _MIN_LEAD > arms.length or next_leg * _MIN_LEAD > legs.length:
-        return "several limbs might be its legs or arms"
+        return _SEVERAL
     return roles
 
 
