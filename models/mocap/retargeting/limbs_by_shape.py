@@ -5,7 +5,8 @@ as twist joints, lie on it and do not bend: a bone is as long as it stays straig
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations, pairwise, product
+from functools import cache
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -172,19 +173,24 @@ def _limbs(chain: tuple[int, ...], tree: Tree) -> Iterator[Limb]:
                 continue
             nodes.pop()
         nodes.append(node)
-    for triple in combinations(range(min(len(nodes), _MAX_CHAIN_LENGTH)), 3):
-        a, b, c = (nodes[k] for k in triple)
-        if c >= tree.n_joints and tree.parents[c] != b:
+    del nodes[_MAX_CHAIN_LENGTH:]
+    apart = median_length(tree.places[:, nodes, None] - tree.places[:, None, nodes])
+
+    @cache
+    def is_bone(first: int, last: int) -> bool:
+        return _is_bone(nodes[first : last + 1], tree.places)
+
+    for a, b, c in combinations(range(len(nodes)), 3):
+        if nodes[c] >= tree.n_joints and tree.parents[nodes[c]] != nodes[b]:
             continue  # the tip of a hand or foot, not of forearm or shank
-        upper, lower = float(tree.distances(a, b)), float(tree.distances(c, b))
+        upper, lower = float(apart[a, b]), float(apart[b, c])
         in_proportion = _LOWER_BONE_RATIOS[0] * upper < lower < _LOWER_BONE_RATIOS[1] * upper
         # A clavicle or a joint beside the pelvis is shorter than the bone beyond.
-        follows_longer = triple[0] > 0 and tree.distances(nodes[triple[0] - 1], a) > upper
-        if not in_proportion or follows_longer or tree.distances(nodes[triple[0] + 1], a) < NEAR_RATIO * upper:
+        if not in_proportion or (a > 0 and apart[a - 1, a] > upper) or apart[a, a + 1] < NEAR_RATIO * upper:
             continue
-        bones = all(_is_bone(nodes[first : last + 1], tree.places) for first, last in pairwise(triple))
-        if bones and not _is_bone((a, b, c), tree.places):
-            yield Limb(chain, (a, b, c), (upper, lower), float(tree.bones[[*chain[: chain.index(a) + 1]]].sum()))
+        ends = (nodes[a], nodes[b], nodes[c])
+        if is_bone(a, b) and is_bone(b, c) and not _is_bone(ends, tree.places):
+            yield Limb(chain, ends, (upper, lower), float(tree.bones[[*chain[: chain.index(ends[0]) + 1]]].sum()))
 
 
 def _is_bone(nodes: Sequence[int], places: Array) -> bool:
