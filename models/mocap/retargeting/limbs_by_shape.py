@@ -34,7 +34,7 @@ _MAX_CHAIN_LENGTH, _MAX_FORK_LIMBS = 24, 12
 
 
 class Tree(NamedTuple):
-    """A skeleton in m frames: its joints, and as further nodes the tips of joints without children.
+    """A skeleton in m frames: its joints, and as further nodes their tips.
 
     Attributes
     ----------
@@ -118,11 +118,10 @@ def tree_of(motion: SourceMotion, positions: Array, rotations: Array) -> Tree:
     """The tree of a motion's joints, from their global positions (n, joints, 3) and rotations (n, joints, 4)."""
     sample = np.unique(np.linspace(0, motion.n_frames - 1, _SAMPLE_COUNT).round().astype(int))
     parents, places = list(motion.parents), [positions[sample]]
-    for joint in sorted(set(range(len(parents))) - set(parents)):
-        if motion.tips[joint].any():
-            parents.append(joint)
-            tip = positions[sample, joint] + quaternions.rotated(rotations[sample, joint], motion.tips[joint])
-            places.append(tip[:, None])
+    for joint in np.flatnonzero(motion.tips.any(axis=1)).tolist():
+        parents.append(joint)
+        tip = positions[sample, joint] + quaternions.rotated(rotations[sample, joint], motion.tips[joint])
+        places.append(tip[:, None])
     nodes = np.concatenate(places, axis=1)
     bones = median_length(nodes - nodes[:, [max(parent, 0) for parent in parents]])
     children = (tuple(k for k, parent in enumerate(parents) if parent == node) for node in range(len(parents)))

@@ -198,6 +198,16 @@ def test_wrist_that_never_bends_is_found_by_the_proportions_of_the_arm(tmp_path)
     np.testing.assert_allclose(numbered.clip.poses, named.clip.poses, atol=1e-9)
 
 
+def test_heel_below_an_ankle_with_a_tip_is_not_taken_for_toes(tmp_path):
+    """The tip, which has no joint, shows where the foot points."""
+    body = human(without=("toe",))(tmp_path)
+    for side in ("Left", "Right"):
+        body = grow(body, f"{side}Foot", [(-3, 0, -4)], 0.0, name=f"{side}Heel")
+        body.tips[body.joints.index(f"{side}Foot")] = (12, 0, -5)
+        body.tips[-1] = 0.0
+    assert "left_foot" not in roles_by_shape(body).ends
+
+
 CAPTURES = ("cmu_amc/02_01.amc", "snu/walk.bvh", "deepmimic/humanoid3d_cartwheel.txt")
 
 
