@@ -19,9 +19,10 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.bodies import people_hips
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget import retarget
-from models.mocap.retargeting.retarget_report import RetargetReport, copy_remarks, floor_remarks
+from models.mocap.retargeting.retarget_report import RetargetReport, copy_remarks, floor_remarks, shape_remarks
 from models.mocap.retargeting.role_file import stated_roles
-from models.mocap.retargeting.skeleton_roles import roles_of
+from models.mocap.retargeting.roles_by_shape import roles_by_shape
+from models.mocap.retargeting.skeleton_roles import Roles, roles_of
 
 Writer: TypeAlias = Callable[[Clip, Path], None]
 _CLIPS_FOLDER = files("models.mocap") / "clips"
@@ -108,19 +109,29 @@ def load(path: Path, hints: Hints | None = None) -> Loaded:
     else:
         _check_single_person(motion, people)
         roles = roles_of(motion.joints, motion.parents, still=motion.still_joints)
+    by_shape = isinstance(roles, str)
     if isinstance(roles, str):
-        names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
-        expected = "the skeleton of a human, or --roles FILE that assigns its joints"
-        raise MotionFileError(path, 1, f"no joint was found for the {roles} (among {names})", expected)
+        roles = _roles_by_shape(motion, hints, roles)
     clip, report = retarget(motion, roles, hints)
     copies = [joint for own in people if len(own) > 1 for joint in own] if hints.roles is None else []
     remarks = (
         *motion.remarks,
         *copy_remarks([motion.joints[joint] for joint in copies], report.taken["pelvis"]),
+        *(shape_remarks(report.taken) if by_shape else ()),
         *report.remarks,
         *floor_remarks(contacts(clip).clearance, clip.poses[:, :3], clip.fps, report.dropped),
     )
     return Loaded(clip, report._replace(remarks=remarks), motion.loops)
+
+
+def _roles_by_shape(motion: SourceMotion, hints: Hints, missing: str) -> Roles:
+    """The roles of joints by the shape of the body, or an error that says for which part no name was found."""
+    roles = roles_by_shape(motion, hints.up)
+    if isinstance(roles, str):
+        names = ", ".join(motion.joints[:8]) + (", …" if len(motion.joints) > 8 else "")
+        expected = f"the skeleton of a human, by names or by shape ({roles}), or --roles FILE that assigns its joints"
+        raise MotionFileError(motion.path, 1, f"no joint was found for the {missing} (among {names})", expected)
+    return roles
 
 
 def _check_single_person(motion: SourceMotion, people: Sequence[Sequence[int]]) -> None:

@@ -26,11 +26,17 @@ class MotionFileError(ModelError):
     """A motion file that cannot be read: `file:line: what is wrong; expected what would be right`, on one line.
 
     Line 0 means the file as a whole; the message then has no line number.
+
+    Attributes
+    ----------
+    what, expected : str
+        What is wrong, and what would be right.
     """
 
     def __init__(self, path: Path | str, line: int, what: str, expected: str) -> None:
         where = f"{printable(str(path), 4096)}:{line}" if line else printable(str(path), 4096)
-        super().__init__(f"{where}: {printable(what, 300)}; expected {expected}")
+        self.what, self.expected = printable(what, 300), expected
+        super().__init__(f"{where}: {self.what}; expected {expected}")
 
 
 def printable(text: str, limit: int) -> str:

@@ -1,6 +1,6 @@
 """Report on how a motion file was interpreted: axes, unit, joints, and what had to be guessed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -246,7 +246,7 @@ def in_place_remarks(path: Array, ankles: Array, fps: float) -> Iterator[str]:
         Frame rate [1/s].
     """
     extent = float(np.ptp(path[:, :2], axis=0).max())
-    if extent > _MAX_IN_PLACE_EXTENT or len(path) < _MIN_IN_PLACE_TIME * fps:
+    if extent > _MAX_IN_PLACE_EXTENT or len(path) < max(2.0, _MIN_IN_PLACE_TIME * fps):
         return
     places = path[:, None] + ankles
     lower = np.argmin(places[:, :, 2], axis=1)
@@ -278,6 +278,13 @@ def copy_remarks(hips: Sequence[str], taken: str) -> Iterator[str]:
             f"{len(hips)} skeletons have their hips at the same position ({', '.join(hips)}): that of {taken} is used"
         )
         yield f'{remark}; --roles FILE with a line such as pelvis = "{hips[-1]}" takes another'
+
+
+def shape_remarks(taken: Mapping[str, str]) -> Iterator[str]:
+    """Where limbs and head begin in a skeleton that was recognised by its shape."""
+    begins = ("left_thigh", "right_thigh", "left_upper_arm", "right_upper_arm", "head")
+    which = ", ".join(f"{taken[body]} as {body}" for body in begins if body in taken)
+    yield f"the joints are recognised by the shape of the body, not by their names: {which}; --roles FILE overrules"
 
 
 def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> Iterator[str]:

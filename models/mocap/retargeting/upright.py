@@ -305,12 +305,8 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         left and right of the shoulders are on average opposite to the hips': no trunk is twisted by more than 90°
         throughout.
     """
-    left = unit(lines.left)
-    # Ahead of each foot's own shank: in the world, the toes of a kneeling body point back.
-    ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
-    toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
-    knees = lines.knee_normals() @ left[:, :, None]
-    signs = [float(np.nanmean(v)) if np.isfinite(v).any() else 0.0 for v in (toes, knees)]
+    evidence = side_evidence(lines)
+    signs = (evidence.toes, evidence.knees)
     clear = [np.sign(s) for s in signs if abs(s) > _MIN_EVIDENCE]
     stated = "left and right as named, or --roles FILE"
     shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
@@ -318,7 +314,7 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"
         what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
         raise MotionFileError(motion.path, 0, what, stated)
-    if abs(signs[0]) <= _MIN_EVIDENCE and _reach(lines, left) > _MIN_REACH:
+    if abs(signs[0]) <= _MIN_EVIDENCE and evidence.hands > _MIN_REACH:
         return
     if clear and sum(clear) < 0:
         back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_MIN_EVIDENCE)
@@ -329,8 +325,32 @@ def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
         )
 
 
-def _reach(lines: BodyLines, left: Array) -> float:
-    """Mean distance of the wrists ahead of the shoulders [leg lengths]; 0 without arms."""
-    ahead = np.cross(left, unit(lines.trunk))
-    reach = np.sum((lines.wrists - lines.shoulders) * ahead[:, None], axis=2) / lines.leg
-    return float(np.nanmean(reach)) if np.isfinite(reach).any() else 0.0
+class SideEvidence(NamedTuple):
+    """How far a body points to where it faces if left and right are as named; 0 for parts that it lacks.
+
+    Attributes
+    ----------
+    toes, knees : float
+        Mean sines by which toes and knees point ahead.
+    elbows : float
+        Mean sine by which elbows point back.
+    hands : float
+        Mean distance of the wrists ahead of the shoulders [leg lengths].
+    """
+
+    toes: float
+    knees: float
+    elbows: float
+    hands: float
+
+
+def side_evidence(lines: BodyLines) -> SideEvidence:
+    """Evidence for the sides of a body."""
+    left = unit(lines.left)
+    # Ahead of each foot's own shank: in the world, the toes of a kneeling body point back.
+    ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
+    toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
+    knees, elbows = lines.knee_normals() @ left[:, :, None], -lines.elbow_normals() @ left[:, :, None]
+    hands = np.sum((lines.wrists - lines.shoulders) * np.cross(left, unit(lines.trunk))[:, None], axis=2) / lines.leg
+    parts = (toes, knees, elbows, hands)
+    return SideEvidence(*(float(np.nanmean(part)) if np.isfinite(part).any() else 0.0 for part in parts))

@@ -1,9 +1,16 @@
 import re
+from functools import cache
 
 import numpy as np
 import pytest
 
+from models.errors import ModelError
+from models.humanoid.skeleton import figure_model
 from models.mocap.library import load
+from models.mocap.motion import kinematics
+from models.mocap.retargeting import abdomen, calibration, retarget
+from models.mocap.retargeting.hints import Hints
+from tests.models.mocap.retargeting.rig_comparison import CalibratedMotion, Motions, deviation_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
 
 
@@ -22,3 +29,63 @@ def walk_rows(tmp_path):
         return load(tmp_path / "b.bvh")
 
     return table, load_rows
+
+
+@pytest.fixture(scope="module")
+def cached_figure_model():
+    """Compile the model of the figure once instead of a dozen times per file."""
+    with pytest.MonkeyPatch.context() as patched:
+        model = cache(figure_model)
+        for module in (abdomen, calibration, kinematics, retarget):
+            patched.setattr(module, "figure_model", model)
+        yield
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return Motions()
+
+
+@pytest.fixture
+def load_calibrated(monkeypatch):
+    """A function that loads a file as a CalibratedMotion."""
+    on_the_floor, seen = retarget.put_on_floor, {}
+
+    def spy(root, segments, *more):
+        seen["found"] = (root, segments)
+        return on_the_floor(root, segments, *more)
+
+    monkeypatch.setattr(retarget, "put_on_floor", spy)
+
+    def read(path, hints=None):
+        clip, report, _ = load(path, hints)
+        return CalibratedMotion(*seen["found"], clip, "; ".join(report.remarks))
+
+    return read
+
+
+@pytest.fixture(scope="module")
+def plain_motions():
+    """Cache of motions from plain rigs."""
+    return {}
+
+
+@pytest.fixture
+def compare(load_calibrated, plain_motions, tmp_path):
+    """A function that gives the deviation of a rig's motion, or the reason for which it is refused."""
+
+    def deviation(rig, clip):
+        write_rig(rig, clip, tmp_path / "r.bvh")
+        try:
+            ours = load_calibrated(tmp_path / "r.bvh")
+        except ModelError as error:
+            return str(error)
+        plain_rig = Rig(without=rig.without, tips=None if rig.tips is None else 0.0)
+        key = clip.name, clip.fps, clip.n_frames, plain_rig.without, plain_rig.tips
+        if key not in plain_motions:
+            write_rig(plain_rig, clip, tmp_path / "plain.bvh")
+            # The up axis of a plain rig is known, so that a wrongly inferred one is a deviation.
+            plain_motions[key] = load_calibrated(tmp_path / "plain.bvh", Hints(up="+Y"))
+        return deviation_of(ours, plain_motions[key], clip)
+
+    return deviation

@@ -8,13 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, figure_model
-from models.mocap.library import load
-from models.mocap.motion.clip import pose_difference
+from models.mocap.library import embedded, load
+from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.readers.formats import read_motion
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.retargeting.retarget import retarget
 from models.mocap.retargeting.skeleton_roles import joints_below, roles_of
 from tests.models.mocap.readers.motion_files import AMC, ASF
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 # Walk, run, jump, dance and kick, from skeletons that differ in rest pose, names, axes and units.
 MOTIONS = (
@@ -316,6 +317,11 @@ def test_body_with_one_arm_keeps_its_trunk_and_head(mocap, model, name, side):
     )
     angles = 2.0 * np.arccos(np.clip(np.abs(turned[..., 0]), 0.0, 1.0))
     assert np.rad2deg(np.median(angles, axis=0)).max() < 14.0
+
+
+def test_single_frame_that_lasts_a_second_is_read(tmp_path):
+    write_rig(Rig(), Clip(embedded("walk").poses[:1], 1.0, "pose"), tmp_path / "r.bvh")
+    assert load(tmp_path / "r.bvh").clip.n_frames == 1
 
 
 def body_rotations(model, clip):
