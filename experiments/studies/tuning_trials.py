@@ -60,10 +60,12 @@ def _gain(one: Comparison) -> str:
 
 def t_interval(values: Array) -> tuple[float, float]:
     """Student's interval of the mean of two or more values, as a bootstrap's is too narrow for a few replications."""
-    from scipy.stats import sem, t
+    from scipy.stats import t
 
-    low, high = t.interval(CONFIDENCE_LEVEL, len(values) - 1, np.mean(values), sem(values))
-    return float(low), float(high)
+    half = (
+        float(t.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, len(values) - 1)) * float(np.std(values, ddof=1)) / len(values) ** 0.5
+    )
+    return float(np.mean(values)) - half, float(np.mean(values)) + half
 
 
 def _chosen_line(one: Tuned) -> str:
