@@ -28,10 +28,12 @@ from experiments.fitting.verdict import TRIAL_SECONDS, Trial, Verdict
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
 _SHARES = (1.0, 0.5, 0.25, 0.0)  # λ of `with_share`, in the order in which they are tried
+_LEAST_SHARE = 0.25  # with which the hand still changes the arms
 # [body weights] RMS residual up to which the first clip is taken at once
 _GOOD_RESIDUAL = MAX_RESIDUAL_IN_FLIGHTS / 2
-# [body weights] RMS residual up to which a share is taken without trying smaller ones: with 11.5 % in the trial, two of
-# nine hands that push a composite of captures make the figure fall, none of five with half the share and 7.0 %.
+# [body weights] RMS residual up to which a share is taken without trying smaller ones, though not zero: with 11.5 % in
+# the trial, two of nine hands that push a composite of captures make the figure fall, none of five with half the share
+# and 7.0 %.
 _SAFE_RESIDUAL = MAX_RESIDUAL_IN_FLIGHTS * 5 / 6
 # [body weights] Residual by which a smaller share of the arms has to be better: of 14 sets of captures that are pushed
 # off lifted curves four would give up half or more of the arms for less. Half the value halves the arms in two of them.
@@ -85,10 +87,8 @@ def select_legs(
                     return haptic_map, ()
                 if verdict.worse() < (-best_verdict.fell, best_verdict.residual - least_gain):
                     best, name, best_verdict, least_gain = haptic_map, names[i], verdict, 0.0
-            if best_verdict.acceptable and best_verdict.residual <= _SAFE_RESIDUAL:
+            if best_verdict.acceptable and (best_verdict.residual <= _SAFE_RESIDUAL or share <= _LEAST_SHARE):
                 return best, ()
-        if best_verdict.acceptable:
-            return best, ()
     return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)
 
 

@@ -71,11 +71,11 @@ def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
 
 
 @pytest.mark.parametrize(("half", "chosen"), [(0.09, (2, 0.5)), (0.112, (1, 1.0))])
-def test_arm_share_is_reduced_near_the_bound_if_that_gains_something(
+def test_arm_share_is_reduced_near_the_bound_if_that_gains_something_but_not_to_zero(
     half: float, chosen: tuple[int, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of hands that push a map with 11.5 % in the trial, one in five makes the figure fall."""
-    verdicts = {(1, 1.0): Verdict(0.115, NEVER), (2, 0.5): Verdict(half, NEVER)}
+    verdicts = {(1, 1.0): Verdict(0.115, NEVER), (2, 0.5): Verdict(half, NEVER), (1, 0.0): Verdict(0.02, NEVER)}
     set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (*chosen, ())
