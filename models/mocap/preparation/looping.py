@@ -128,7 +128,7 @@ def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
 
 
 def _gap(clip: Clip, first: int, last: int) -> float:
-    """D between two frames [rad]."""
+    """Distance d between two frames [rad]."""
     return float(frame_distances(clip, np.array([first, last]))[0][0, 1])
 
 
