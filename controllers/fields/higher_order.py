@@ -10,7 +10,15 @@ from numba import njit
 from controllers.checks import check_field_types, checked
 from controllers.curves.branches import BRANCHES, SAME_BRANCH, branches
 from controllers.curves.closest_point import closest_phase
-from controllers.curves.trajectory import END, PERIODIC, START, Trajectory, curve_point, curve_velocity
+from controllers.curves.trajectory import (
+    END,
+    PERIODIC,
+    START,
+    Trajectory,
+    curve_acceleration,
+    curve_point,
+    curve_velocity,
+)
 from controllers.errors import ParameterError
 from controllers.fields.admissible import admissible_speeds
 from controllers.fields.algebra.instructions import TRACE_RIVER, write_trace
@@ -223,14 +231,28 @@ def _select_river(params: Array, at: int, table: Array, count: int, memory: Arra
 
 
 @njit
-def _eased_pace(params: Array, at: int, row: Array, taken: bool, memory: Array, slot: int, t: float) -> float:
+def _phase_share(params: Array, curve: int, phase: float, p: Array) -> float:
+    """Rate dt*/dt of the nearest point over that of a hand with the same velocity on the curve."""
+    point, tangent = curve_point(params, curve, phase), curve_velocity(params, curve, phase)
+    bend, square, slope = curve_acceleration(params, curve, phase), 0.0, 0.0
+    for i in range(3):
+        square += tangent[i] ** 2
+        slope += (point[i] - p[i]) * bend[i]
+    # Nearer to the centre of curvature than half its distance the phase is no measure of pace.
+    return square / max(square + slope, 0.5 * square, 1e-24)
+
+
+@njit
+def _eased_pace(params: Array, at: int, row: Array, taken: bool, memory: Array, slot: int, t: float, p: Array) -> float:
     """Pace s of the active river's current along its curve; `taken` if the hand has just come into this river."""
     ease = _read_crossing(params, at).ease
     if ease <= 0.0:
         return 1.0
     if taken:
         river, speeds, curve = _read_river(params, at, row[_RIVER])
-        v = memory[slot + _FILTERED_VELOCITY : slot + _TAKEN_TIME]
+        share, v = _phase_share(params, curve, row[_PHASE], p), work_array(3)
+        for i in range(3):
+            v[i] = share * memory[slot + _FILTERED_VELOCITY + i]
         s, speed = _nearest_admissible(params, river, speeds, curve, row[_PHASE], v)
         memory[slot + _TAKEN_TIME], memory[slot + _TAKEN_PACE] = t, s / speed
     share = smooth_step((t - memory[slot + _TAKEN_TIME]) / ease)
@@ -255,7 +277,7 @@ def higher_order_wrench(
         selected = _select_river(params, at, table, count, memory, slot)
         if selected >= 0:
             taken = before != memory[slot + _ACTIVE]
-            pace = _eased_pace(params, at, table[selected], taken, memory, slot, hand[HAND_TIME])
+            pace = _eased_pace(params, at, table[selected], taken, memory, slot, hand[HAND_TIME], p)
             _add_force(params, at, table[selected], 1.0, pace, p, v, wrench)
     else:
         selected = _add_smooth_forces(params, at, table, count, p, v, wrench)
@@ -300,7 +322,10 @@ class HigherOrder(Law):
     both forms select the river of smallest m_i, if m_i < r.
 
     A river may bring a hand of another pace to its own gradually: in the discrete form its current along the curve is
-    s φ̇_i, and s goes from the admissible speed nearest to the hand's when it was taken, over |φ̇_i|, within T_e to 1.
+    s φ̇_i, and s goes from the pace of the hand when it was taken, within T_e, to 1. The pace is that of the nearest
+    point, so a hand beside a bend keeps its angular speed, clamped to the admissible speeds over |φ̇_i|:
+
+    .. math:: s_0 = \frac{v \cdot \dot\varphi_i}{|\dot\varphi_i|^2 + (\varphi_i - p) \cdot \ddot\varphi_i}
 
     Each branch of a river (`controllers.curves.branches`) takes part separately, so a river that crosses itself is
     treated like two rivers that cross.

@@ -187,6 +187,22 @@ def test_river_brings_a_hand_to_its_own_pace_within_the_ease_time():
         np.testing.assert_allclose(forces[:, 0], river.drag * (current - pace) * SPEED, atol=1e-9)
 
 
+@pytest.mark.parametrize("inside", [-0.004, 0.004])
+def test_hand_beside_a_bend_keeps_the_pace_of_its_phase_when_it_is_taken(inside):
+    # Beside a circle a hand of the river's angular speed is slower or faster than the river, but its phase is not.
+    angles = np.linspace(0.0, 2.0 * np.pi, 241)
+    points = 0.05 * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    points[-1] = points[0]
+    course = Trajectory(np.linspace(0.0, 4.0, 241), points, periodic=True)
+    river = replace(straight_river(0.0), curve=course, speeds=[[0.02, 0.2]] * 2)
+    program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.4).program()
+    rate, radius = 2.0 * np.pi / 4.0, 0.05 + inside
+    for pace in (0.8, 1.0, 1.2):
+        (force,), _ = _run(program, [HandState.at([radius, 0.0, 0.0], [0.0, pace * rate * radius, 0.0])])
+        share = (1.0 - (inside / river.epsilon) ** 2) ** 3
+        assert force[1] == pytest.approx(share * river.drag * rate * pace * (0.05 - radius), rel=1e-3)
+
+
 def test_each_taking_of_a_hand_eases_it_anew():
     river = replace(straight_river(0.0), speeds=[[0.5 * SPEED, 2.0 * SPEED]] * 2)
     program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.1).program()
