@@ -15,7 +15,7 @@ from controllers.haptic_map.lifting.transitions import MapTransition
 from controllers.motion.loops import append_reversal, checked_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.map_quality import N_SAMPLES, Layout, body_weights, lap_times
-from experiments.lifting.repeats import repeated
+from experiments.lifting.repeats import gait_strides, repeated
 from experiments.setups.parts.clips import load_clips
 from models.errors import ModelError
 from models.humanoid.skeleton import figure_model
@@ -148,4 +148,4 @@ def _unique_labels(names: Sequence[str]) -> tuple[str, ...]:
 
 def _motion(clip: Clip, name: str, must_close: bool) -> Motion:
     closed = must_close or (clip.n_frames > 1 and closes(checked_clip(clip.poses, clip.fps, name)))
-    return Motion(clip.poses, clip.fps, name, closed, contacts(clip).loaded)
+    return Motion(clip.poses, clip.fps, name, closed, contacts(clip).loaded, gait_strides(clip))

@@ -87,7 +87,7 @@ def lift(motions: Sequence[Motion], weights: Array, room: Room, rng: np.random.G
     phases = common_lap(clips, clip_features)
     laps = np.array([clip.duration / (1.0 - phase.gap) for clip, phase in zip(clips, phases, strict=True)])
     compared = _compare_clips(clip_features, phases, laps)
-    transitions = find_transitions(compared, room.alike)
+    transitions = find_transitions(compared, room.alike, [clip.strides for clip in clips])
     rate, change = _angular_rates(clips, phases)
     _check_speeds(clips, rate, change, room)
     task = Task(

@@ -35,6 +35,8 @@ class Motion:
         Whether the last frame equals the first up to a displacement over the ground.
     supports : Mask, shape (n, k)
         Which of k feet bear load in each frame.
+    strides : int
+        Number of strides of a gait in the clip; 0 for other motions.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Motion:
     name: str
     closed: bool
     supports: Mask
+    strides: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "poses", checked_clip(self.poses, self.fps, f"clip {self.name!r}"))

@@ -1,5 +1,7 @@
 """Transitions: found where two motions agree in pose, velocity and support, and curves meet there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -66,6 +68,31 @@ def test_transition_needs_agreement_for_a_while_on_the_same_feet():
     other = feet.copy()
     other[80:160] = ~feet[80:160]
     assert transitions(distances, other) == []
+
+
+@pytest.mark.parametrize(
+    ("strides", "speed", "found"), [((2, 2), 3.5, 1), ((2, 3), 3.5, 0), ((0, 0), 3.5, 0), ((2, 2), 4.5, 0)]
+)
+def test_gaits_in_step_have_a_transition_where_they_differ_least_if_their_speeds_are_near(strides, speed, found):
+    steps, feet = np.arange(200), np.arange(200) % 100 < 50
+    distances = 6.0 - np.cos(2.0 * np.pi * (steps - 70) / 200)
+    walk, run = (features_of(np.random.default_rng(3), away, feet) for away in (0.0 * steps, distances))
+    run.velocity[:, 0] = speed
+    compared = compare([walk, run], np.ones((200, 2), bool), np.full(2, 2.0))
+    transitions = find_transitions(compared, 0.3, strides)
+    assert len(transitions) == found
+    assert all(np.degrees(at.angle) == pytest.approx(70 * 1.8, abs=10.0) for at in transitions)
+
+
+def test_curves_of_two_motions_that_differ_pass_in_reach_of_a_river_where_they_have_a_transition():
+    walk, run = motion(swinging(7, amplitude=0.2), "walk"), motion(swinging(9, amplitude=0.9), "run")
+    apart = lifted_at((walk, run))
+    assert not apart.transitions
+    assert apart.after.separation > 0.04
+    in_step = lifted_at((replace(walk, strides=2), replace(run, strides=2)))
+    (meeting,) = in_step.after.meetings
+    assert meeting.distance < 0.012
+    assert in_step.after.separation >= ROOM.separation
 
 
 def test_motions_that_never_agree_have_no_transition():
