@@ -1,25 +1,28 @@
 """Experiment that could refute changes between gaits on a lifted map: hands go from one curve to another at any angle.
 
 ``python -m experiments.studies.gait_changes MAP.npz FIRST SECOND`` moves a hand from curve to curve of a map that
-`hvf lift` wrote, begun at twelve angles, and holds it at shares of the way between them. The physical figure follows
-each animation, and a table shows its residual, or when it falls.
+`hvf lift` wrote, as fast as rivers do, begun at six angles, and holds it at shares of the way between them. The
+physical figure follows each animation, and a table shows its residual, or when it falls.
 
-A hand has changed its pace over the same time as its place, or over another one: a river that takes a hand sets the
-pace of its own clip at once, or within a second (`controllers.fields.higher_order.HigherOrder.ease`).
+A river that takes a hand sets the pace of its own clip at once, or within a second
+(`controllers.fields.higher_order.HigherOrder.ease`), and the figure goes from clip to clip with the hand, or gradually
+(`sim.reference.cross_track`).
 """
 
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lsim
 
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import stylus_path
 from experiments.files.map_files import load_figure_map
 from experiments.fitting.verdict import FPS
 from experiments.preparation.tracking_trial import Followed, followed
-from experiments.setups.modes.lifted_runs import curve_number
+from experiments.setups.modes.lifted_runs import CROSS_RATE, curve_number
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from models.mocap.motion.clip import Clip
@@ -27,9 +30,11 @@ from sim.compilation.unit_workers import compile_units
 from sim.errors import SimError
 from sim.reference.reference import map_poses
 
-TIMES = ((0.35, 0.35), (0.35, 1.0), (1.0, 1.0))
-"""Durations of a change of place and of pace [s]."""
-ANGLES = tuple(np.arange(0.0, 2.0 * np.pi, np.pi / 6.0))
+CROSSING_TIME = 0.35
+"""Duration of a hand's change of place [s]."""
+MANNERS = ((math.inf, 0.35), (math.inf, 1.0), (CROSS_RATE, 1.0))
+"""Rates ω with which the figure follows across [1/s], and durations of the change of pace [s]."""
+ANGLES = tuple(np.arange(0.0, 2.0 * np.pi, np.pi / 3.0))
 """Angles of the lap at which changes begin [rad]."""
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Shares of the way from curve to curve at which a hand is held."""
@@ -55,10 +60,19 @@ def _followed(clip: Clip) -> Followed:
     return followed(clip, clip.duration - 1.0, compile_units)
 
 
-def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tuple[float, float]) -> Followed:
+def _followed_share(shares: Array, rate: float) -> Array:
+    """The shares of the way (n,) at which the figure is, of a hand at shares (n,), in steps of 1/`FPS`."""
+    if math.isinf(rate):
+        return shares
+    low_pass = ([rate**2], [1.0, 2.0 * rate, rate**2])
+    return np.asarray(lsim(low_pass, shares, np.arange(len(shares)) / FPS)[1])
+
+
+def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, manner: tuple[float, float]) -> Followed:
     """How the figure follows a hand that goes from one closed curve to another, begun at an angle [rad].
 
-    Place and pace change along smooth steps of the given durations [s]; needs compiled code.
+    The hand's place changes along a smooth step of `CROSSING_TIME`, its pace along one of the second number of `manner`
+    [s], whose first is ω [1/s]; needs compiled code.
     """
     first, second = (_paces(haptic_map, i) for i in curves)
     angles = [0.0]
@@ -69,10 +83,10 @@ def changed(haptic_map: Lifted, curves: tuple[int, int], begin: float, times: tu
         angles.append(angles[-1] + first(angles[-1]) / FPS)
     shares = [0.0] * len(angles)
     for since in np.arange(1, round(_AFTER * FPS) + 1) / FPS:
-        share, pace = smooth_steps(since / np.array(times))
+        share, pace = smooth_steps(since / np.array([CROSSING_TIME, manner[1]]))
         angles.append(angles[-1] + ((1.0 - pace) * first(angles[-1]) + pace * second(angles[-1])) / FPS)
         shares.append(float(share))
-    return _followed(_animation(haptic_map, np.array(angles), np.array(shares), curves))
+    return _followed(_animation(haptic_map, np.array(angles), _followed_share(np.array(shares), manner[0]), curves))
 
 
 def held(haptic_map: Lifted, curves: tuple[int, int], share: float, seconds: float = 9.0) -> Followed:
@@ -97,13 +111,13 @@ def main(file: str, first: str, second: str) -> None:
     if not (haptic_map.closed[one] and haptic_map.closed[other]):
         raise SimError(f"{first} and {second}: one of them is open; expected two curves that close, as gaits have")
     print("Residual [% of weight] or time of the fall [s], by the angle at which the change begins.\n")
-    print("| change | place, pace [s] |", " | ".join(f"{np.degrees(angle):.0f}°" for angle in ANGLES), "|")
+    print("| change | ω [1/s], pace [s] |", " | ".join(f"{np.degrees(angle):.0f}°" for angle in ANGLES), "|")
     print("|---" * (2 + len(ANGLES)) + "|")
     for curves in ((one, other), (other, one)):
         name = " → ".join(haptic_map.names[i] for i in curves)
-        for times in TIMES:
-            cells = [_cell(changed(haptic_map, curves, angle, times)) for angle in ANGLES]
-            print(f"| {name} | {times[0]:g}, {times[1]:g} |", " | ".join(cells), "|", flush=True)
+        for manner in MANNERS:
+            cells = [_cell(changed(haptic_map, curves, angle, manner)) for angle in ANGLES]
+            print(f"| {name} | {manner[0]:g}, {manner[1]:g} |", " | ".join(cells), "|", flush=True)
     cells = [f"{share:g}: {_cell(held(haptic_map, (one, other), share))}" for share in SHARES]
     print("\nHeld at shares of the way:", ", ".join(cells))
 

@@ -18,6 +18,7 @@ from sim.compilation.compiled import entry_point
 from sim.compilation.kernel_units import linked_stages
 from sim.compilation.units import Unit
 from sim.errors import SimError
+from sim.reference.cross_track import no_cross_track
 from sim.reference.reference_state import CompiledReference
 from sim.reference.stylus_filter import turn_rate
 from sim.reference.transition import Transition, make_transition
@@ -136,7 +137,7 @@ def check_reference(period: float, bandwidth: float, blend: float) -> None:
 
 def make_reference(
     figure_model: mujoco.MjModel, compiled: CompiledMap, period: float, bandwidth: float, blend: float = 0.0,
-    limbs: Array | None = None, clip_seconds: float = 0.0,
+    limbs: Array | None = None, clip_seconds: float = 0.0, cross_track: Array | None = None,
 ) -> CompiledReference:  # fmt: skip
     """The reference of a run, before its first update, without the addresses of the map's kernels.
 
@@ -159,6 +160,8 @@ def make_reference(
     clip_seconds : float
         Duration of the clips [s] if a figure that is held in flight is to be lowered to the floor
         (`sim.reference.floor_lowering`); 0 if not.
+    cross_track : Array, optional
+        How the figure follows a hand across rivers (`sim.reference.cross_track`); by default at once.
 
     Raises
     ------
@@ -170,7 +173,7 @@ def make_reference(
     transition = make_transition(nq, nv, blend, np.zeros((0, LIMB_SIZE)) if limbs is None else limbs)
     return _initial_reference(compiled, (nq, nv), transition)._replace(
         figure_model=figure_model._address, smoothing=math.exp(-2.0 * math.pi * bandwidth * period), period=period,
-        clip_seconds=clip_seconds,
+        clip_seconds=clip_seconds, cross_track=np.zeros(0) if cross_track is None else cross_track,
     )  # fmt: skip
 
 
@@ -188,8 +191,8 @@ def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition
         size=size, hand=np.zeros((3, 3)), trail=np.zeros((2, 3)), trail_motion=np.zeros((3, 3)),
         orientation=np.array([1.0, 0.0, 0.0, 0.0]), turning=np.zeros((2, 3)), started=np.zeros(1), pose=np.zeros(nq),
         velocity=np.zeros(nv), acceleration=np.zeros(nv), transition=transition, clip_seconds=0.0,
-        settled=np.zeros(3), scratch_memory=memory.copy(), scratch_x=np.zeros(7), before=np.zeros(nq),
-        after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
+        settled=np.zeros(3), cross_track=np.zeros(0), crossing=no_cross_track(), scratch_memory=memory.copy(),
+        scratch_x=np.zeros(7), before=np.zeros(nq), after=np.zeros(nq), to_before=np.zeros(nv), to_after=np.zeros(nv),
     )  # fmt: skip
 
 

@@ -43,6 +43,10 @@ class CompiledReference(NamedTuple):
         (`sim.reference.floor_lowering`); 0 if not.
     settled : Array
         Share s of that lowering, with its first and second derivative, shape (3,).
+    cross_track : Array
+        Parameters of the filter across rivers (`sim.reference.cross_track`); empty for none.
+    crossing : Array
+        Its state, shape (8,).
     scratch_memory, scratch_x : Array
         Scratch: a copy of `memory`, and the stylus pose (7,) at which the map is evaluated.
     before, after, to_before, to_after : Array
@@ -68,6 +72,8 @@ class CompiledReference(NamedTuple):
     transition: Transition
     clip_seconds: float
     settled: Array
+    cross_track: Array
+    crossing: Array
     scratch_memory: Array
     scratch_x: Array
     before: Array

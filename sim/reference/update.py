@@ -20,6 +20,7 @@ from controllers.haptic_map.river_memory import (
 )
 from geometry.arrays import Array
 from sim.compilation.native import mj_differentiate_pos
+from sim.reference.cross_track import shift_across
 from sim.reference.floor_lowering import approach, lower_to_floor, lowering_goal
 from sim.reference.reference_state import (
     CompiledReference,
@@ -49,9 +50,13 @@ def update_reference(reference: CompiledReference, stylus: Array, trace: Array) 
         Measured position in H and orientation wxyz, shape (7,).
     trace : Array
         Trace of the field, with the active river and the hand's phase on it (see
-        `controllers.fields.algebra.instructions`). Not read; see `update_river_reference`.
+        `controllers.fields.algebra.instructions`).
     """
-    _filter_stylus(reference, stylus)
+    measured = reference.scratch_x
+    measured[:] = stylus
+    if reference.cross_track.shape[0] > 0:
+        shift_across(reference.cross_track, reference.crossing, trace, measured, reference.period)
+    _filter_stylus(reference, measured)
     evaluate_around(reference, reference.hand)
     _differentiate(reference)
 

@@ -17,6 +17,7 @@ from experiments.setups.parts.hands import PUSH_START_DISTANCE
 from experiments.setups.parts.pace import check_reach, paced
 from experiments.setups.parts.part_types import RiverChoice
 from sim.body.figure import FigureGains
+from sim.reference.cross_track import packed_cross_track
 from sim.reference.reference import map_poses
 from sim.users.hand.actions import Push
 
@@ -25,14 +26,20 @@ _SPEED_RANGE = (0.5, 2.0)
 # [s] in which a river brings a hand to its own pace: from walk to run within 0.35 s the figure falls at all of twelve
 # angles, if the pace changes as fast, and at none if it takes a second (`experiments.studies.gait_changes`)
 _EASE_TIME = 1.0
+CROSS_RATE = 3.0
+"""ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.56 s.
+
+Of 72 changes between six pairs of gaits, begun at any angle, 28 fall if the figure follows at once, none with 3/s; with
+4/s two from walk to run, with 6/s four from one captured walk to a run (`experiments.studies.gait_changes`)."""
+
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 # [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures stay up, on the default
 # layout and its mirror image
 _PUSH_LEAD_TIME = 0.36
 _CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
-# [m]; a hand changes over within about 0.25 s, so this distance moves the figure at 1 m/s. Embedded clips are 12
-# and 17 mm apart at their transitions; captures are 1.6 m apart at one, where the figure falls.
+# [m]; embedded clips are 12 and 17 mm apart at their transitions; captures are 1.6 m apart at one, where a figure that
+# changes over within a second moves at up to 1.8 m/s, and falls.
 _MAX_CARRY_DISTANCE = 0.25
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
@@ -83,7 +90,8 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
     stiffness, damping = river_gains(mode)
     given = tuple(haptic_map.curve(i) for i in range(len(haptic_map.names)))
     rivers = tuple(lifted_river(paced(curve, damping, stiffness), mode) for curve in given)
-    return side_by_side(RiverBundle(rivers, haptic_map.names), given)
+    choice = side_by_side(RiverBundle(rivers, haptic_map.names), given)
+    return choice._replace(cross_track=packed_cross_track(CROSS_RATE, haptic_map.sites))
 
 
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
@@ -137,7 +145,7 @@ def carried_over(haptic_map: Lifted, transition: MapTransition) -> tuple[Lifted,
     names = f"{haptic_map.names[transition.first]} and {haptic_map.names[transition.second]}"
     return haptic_map, (
         f"where {names} agree, their positions on the floor are {apart:.1f} m apart: a push over carries the figure "
-        "there within a quarter of a second, and it may fall; clips that stay in place, or keep going, suit better",
+        "there within a second, and it may fall; clips that stay in place, or keep going, suit better",
     )
 
 

@@ -55,7 +55,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
     field = FixedField(law, course, power, springs, notes, urged, pushes=pushes, other=beside(choice.given, maps.curve))
     parts = fixed_curve_parts(config, mode, maps, field)
-    return replace(parts, remarks=parts.remarks + slow_remark(choice.pace))
+    return replace(parts, remarks=parts.remarks + slow_remark(choice.pace), cross_track=choice.cross_track)
 
 
 def slow_remark(pace: float) -> tuple[str, ...]:
@@ -85,17 +85,16 @@ def river_time(mode: Rivers) -> float:
 
 def law_of(mode: Rivers, choice: RiverChoice, admission: float = ADMISSION) -> Law:
     """Law of force of several rivers: their sum, or a higher-order law that gives the hand to one river."""
-    bundle, _, pace, hysteresis, ease = choice
     if mode.crossing == "sum":
-        return bundle
+        return choice.bundle
     return HigherOrder(
-        bundle,
-        admission * pace,
-        SIGMA[mode.crossing] * pace,
-        hysteresis,
+        choice.bundle,
+        admission * choice.pace,
+        SIGMA[mode.crossing] * choice.pace,
+        choice.hysteresis,
         mode.crossing,
         SELECTION_TIME_CONSTANT,
-        ease if mode.crossing == "discrete" else 0.0,
+        choice.ease if mode.crossing == "discrete" else 0.0,
     )
 
 

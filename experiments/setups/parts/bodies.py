@@ -27,8 +27,9 @@ def body_of(parts: Parts, world: World, compiled: CompiledMap) -> tuple[BodyStat
     if world.kind == "robot":
         return robot_state(world, _FEEDBACK_RATE), make_reference(world.body, compiled, period, config.smoothing)
     reference = make_reference(
-        world.body, compiled, period, config.smoothing, config.blend, packed_legs(world.body), parts.held_seconds
-    )
+        world.body, compiled, period, config.smoothing, config.blend, packed_legs(world.body), parts.held_seconds,
+        parts.cross_track,
+    )  # fmt: skip
     if world.kind == "kinematic":
         return kinematic_figure(), reference
     gains = parts.gains._replace(force_bound=config.residual_force, moment_bound=config.residual_moment)

@@ -67,6 +67,8 @@ class RiverChoice(NamedTuple):
         Margin in favour of the river that already has the hand [m/s].
     ease : float
         Time in which a river brings a hand that it has taken to its own pace [s].
+    cross_track : Array
+        How the figure follows a hand across rivers (`sim.reference.cross_track`); empty: at once.
     """
 
     bundle: RiverBundle
@@ -74,6 +76,7 @@ class RiverChoice(NamedTuple):
     pace: float
     hysteresis: float
     ease: float = 0.0
+    cross_track: Array = np.zeros(0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,6 +282,8 @@ class Parts:
     held_seconds : float
         Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0; where it is
         slower than they are, their flights are lowered to the floor.
+    cross_track : Array
+        As in `RiverChoice`.
     walking : Walking, optional
         How a figure is led: its walker is the map's argument; without it that is the stylus pose.
     argument_at : callable
@@ -303,6 +308,7 @@ class Parts:
     argument_at: Callable[[Array, Array], Array]
     bends: bool = False
     held_seconds: float = 0.0
+    cross_track: Array = field(default_factory=lambda: np.zeros(0))
     walking: Walking | None = None
     handled: tuple[tuple[float, float], ...] = ()
     remarks: tuple[str, ...] = ()
