@@ -50,8 +50,9 @@ _FILL_FRACTION = 0.8
 # Least distance at a transition, as a fraction of the target distance κ d of the poses. With half of it walk and run
 # pass within 5.9 mm and h_* changes by 74 %, with twice 12.7 mm and 63 %.
 _MIN_DISTANCE_RATIO = 0.2
-# [m] largest κ d at a transition: the curves then pass within some 10 mm, so that a hand comes into the other's tube of
-# 15 mm before it leaves its own. Two captured gaits alone, spread over the rectangle, pass 16 to 25 mm apart.
+# [m] largest κ d of two motions at their transition, beyond which T of the pair is reduced. Curves then pass within
+# 12 mm, so a hand comes into the other's tube of 15 mm before it leaves its own. Two captured gaits alone, spread over
+# the rectangle, pass 16 to 25 mm apart.
 _MAX_SPAN = 0.032
 # Weights of the terms. Half or twice the separation and limit weights leave the distances unchanged, the tangent weight
 # changes them by 0.3 mm, the bend weight by 0.4, the approach weight by 0.6. The median condition number of h_* half
@@ -99,23 +100,22 @@ class Task:
 
     @property
     def scale(self) -> float:
-        """κ: ratio of distances in the rectangle to distances of poses.
-
-        The rectangle is filled, unless motions that have a transition would be more than `_MAX_SPAN` apart at it.
-        """
+        """κ: ratio of distances in the rectangle to distances of poses."""
         size = float(np.linalg.norm(self.rectangle.high - self.rectangle.low))
-        filled = _FILL_FRACTION * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
-        rows = [round(at.angle / (2.0 * np.pi) * N_ANGLES) % N_ANGLES for at in self.transitions]
-        apart = [self.distance[row, at.first, at.second] for row, at in zip(rows, self.transitions, strict=True)]
-        return min(filled, _MAX_SPAN / max([*apart, 1e-9]))
+        return _FILL_FRACTION * size / max(float(self.distance.mean(axis=0).max()), 1e-9)
 
     def targets(self) -> tuple[Array, Array, Array]:
         """T, S and w of the energy, each of shape (N_ANGLES, n, n)."""
-        wanted = np.maximum(self.scale * self.distance, _SAFETY_FACTOR * self.separation)
+        distance = self.distance.copy()
+        for at in self.transitions:
+            span = self.scale * distance[round(at.angle / (2.0 * np.pi) * N_ANGLES) % N_ANGLES, at.first, at.second]
+            for i, j in ((at.first, at.second), (at.second, at.first)):
+                distance[:, i, j] *= min(1.0, _MAX_SPAN / max(float(span), 1e-9))
+        wanted = np.maximum(self.scale * distance, _SAFETY_FACTOR * self.separation)
         least = np.full(wanted.shape, _SAFETY_FACTOR * self.separation)
         weight = np.ones(wanted.shape)
         for first, second, near in self.windows():
-            nearest = np.maximum(self.approach, _MIN_DISTANCE_RATIO * self.scale * self.distance[:, first, second])
+            nearest = np.maximum(self.approach, _MIN_DISTANCE_RATIO * self.scale * distance[:, first, second])
             target = nearest + (wanted[:, first, second] - nearest) * near
             floor = self.approach + (least[:, first, second] - self.approach) * near
             for i, j in ((first, second), (second, first)):
