@@ -29,8 +29,9 @@ _EASE_TIME = 1.0
 CROSS_RATE = 3.0
 """ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.56 s.
 
-Of 72 changes between six pairs of gaits, begun at any angle, 28 fall if the figure follows at once, none with 3/s; with
-4/s two from walk to run, with 6/s four from one captured walk to a run (`experiments.studies.gait_changes`)."""
+Of 72 changes between six pairs of captured gaits 28 fall if the figure follows at once, and three with 3/s; with 4/s two
+of six from the embedded walk to the run fall, with 6/s four of six between two captures
+(`experiments.studies.gait_changes`)."""
 
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 # [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures stay up, on the default
