@@ -48,7 +48,7 @@ class Command:
             outcome = prepare_file(self.source, self.target, self.loop, self.mirror, hints, self.report, self.overwrite)
         output = {
             "well_formed": outcome.measures, "fidelity": outcome.prepared.fidelity, "followed": outcome.followed,
-            "faults": outcome.faults(), "doubts": outcome.doubts,
+            "slide": outcome.slide, "faults": outcome.faults(), "doubts": outcome.doubts,
         }  # fmt: skip
         report = outcome.prepared.report
         lines = [*(report.notes() if report else ()), *summary(outcome)]

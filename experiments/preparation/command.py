@@ -7,13 +7,15 @@ from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
 from experiments.preparation.tracking_trial import TRIAL_SECONDS, followed
+from experiments.results.measures.soles import Soles
 from geometry.whole_files import write_text
 from models.mocap.library import check_target, writing
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
 from models.mocap.preparation.prepare import prepared
 from models.mocap.preparation.well_formed import well_formed
 from models.mocap.readers.own_bvh import write_bvh
 from models.mocap.retargeting.hints import Hints
+from models.world.scene import SceneConfig
 
 
 def prepare_file(
@@ -67,4 +69,12 @@ def prepare_file(
 
 
 def _measure(clip: Clip) -> Measured:
-    return Measured(well_formed(clip, clip_flights(clip)), followed(clip, max(TRIAL_SECONDS, clip.duration)))
+    follows = followed(clip, max(TRIAL_SECONDS, clip.duration))
+    return Measured(well_formed(clip, clip_flights(clip)), follows, foot_slide(clip))
+
+
+def foot_slide(clip: Clip) -> float:
+    """How far a foot slides over the floor at most, across the seam of a closed clip too [m]."""
+    soles = Soles(SceneConfig())
+    soles.add((clip.with_next_lap() if clip.closes(CLOSURE_TOLERANCE) else clip).poses)
+    return soles.slide

@@ -28,12 +28,13 @@ _SIDE_OFFSET = 0.6  # distance of each figure from the middle [m]
 
 def page(outcome: PreparedFile, captured: Measured) -> str:
     """The report as a self-contained page: measures before and after, what was changed, pictures and replay of both."""
-    prepared, (before, follows) = outcome.prepared, captured
+    prepared, (before, follows, slide) = outcome.prepared, captured
     picture = image(filmstrip({"as captured": prepared.captured, "prepared": prepared.clip}), "stick figures")
     gap_before, gap = gaps(prepared)
-    names = ("soles", "ends", "continuity", "dynamics", "loop", "physical figure")
-    captured_lines = (*before.lines(), gap_before, follows.line())
-    prepared_lines = (*outcome.measures.lines(), gap, outcome.followed.line())
+    names = ("soles", "ends", "continuity", "dynamics", "loop", "physical figure", "slide")
+    slides = tuple(f"a foot slides by {1000 * far:.0f} mm along the floor at most" for far in (slide, outcome.slide))
+    captured_lines = (*before.lines(), gap_before, follows.line(), slides[0])
+    prepared_lines = (*outcome.measures.lines(), gap, outcome.followed.line(), slides[1])
     rows = "".join(
         f"<tr><th>{name}</th><td>{escape(first)}</td><td>{escape(then)}</td></tr>"
         for name, first, then in zip(names, captured_lines, prepared_lines, strict=True)

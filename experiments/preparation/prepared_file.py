@@ -9,7 +9,7 @@ from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS, exceeding_text
+from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS, MAX_SLIDE, exceeding_text
 from models.mocap.preparation.laps import frame_distances
 from models.mocap.preparation.prepare import Prepared
 from models.mocap.preparation.well_formed import WellFormed
@@ -27,10 +27,11 @@ _MIN_ROOT_SHIFT = 0.02  # displacement of the root that is reported [m]: stances
 
 
 class Measured(NamedTuple):
-    """Measures of a clip, and how the physical figure follows it."""
+    """Measures of a clip, how the physical figure follows it, and how far its feet slide [m]."""
 
     measures: WellFormed
     followed: Followed
+    slide: float
 
 
 class PreparedFile(NamedTuple):
@@ -44,6 +45,8 @@ class PreparedFile(NamedTuple):
         Measures of the clip.
     followed : Followed
         How the physical figure follows it.
+    slide : float
+        How far a foot slides over the floor at most (`models.mocap.motion.foot_skate`), under load or not [m].
     flights : tuple of str
         Flights that the certificate refutes, and why, a line each.
     doubts : tuple of str
@@ -53,6 +56,7 @@ class PreparedFile(NamedTuple):
     prepared: Prepared
     measures: WellFormed
     followed: Followed
+    slide: float
     flights: tuple[str, ...]
     doubts: tuple[str, ...]
 
@@ -69,10 +73,16 @@ class PreparedFile(NamedTuple):
         return (
             *self.followed.faults(self.measures.flights > 0),
             *infeasible(self.prepared),
+            *self._sliding(),
             *self.measures.faults(),
             *self.flights,
             *self.prepared.fidelity.faults(),
         )
+
+    def _sliding(self) -> tuple[str, ...]:
+        slide, bound = 1000 * self.slide, 1000 * MAX_SLIDE
+        line = f"a foot slides by {exceeding_text(slide, bound)} mm along the floor; {bound:g} at most"
+        return (line,) if slide > bound else ()
 
     def advice(self) -> tuple[str, ...]:
         """What the clip lacks of the capture, and what may help if the figure does not stand with it, a line each."""

@@ -8,6 +8,9 @@ MAX_SOLE_TILT = np.deg2rad(2.0)  # of soles in stance
 # Depth of any sole at any time [m]: those that swing are the lower by low-pass filtering, up to 6 mm in 50 clips.
 MAX_SOLE_DEPTH = 0.01
 MAX_SKATE = 0.005  # foot skate in a stance [m]
+# Slide of a foot within 3 mm of the floor, loaded or not [m], as in a change of river. Toes that leave the floor brush
+# over it by up to 27 mm; a foot that jumped across a seam slid by 94 mm or more.
+MAX_SLIDE = 0.03
 # RMS residual force [body weights]. For gaits and gestures, the bound of Hicks et al. (2015); for motions with flights,
 # the residual that the preparation's prototype left in fighting and jumping jacks (11 and 12 %).
 MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS = 0.05, 0.12

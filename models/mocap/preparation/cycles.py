@@ -1,7 +1,7 @@
 r"""The part of a capture that repeats itself: a cycle, or half a stride whose mirror image continues it.
 
-The distance d of two frames is that of `laps`. A part of the clip is its cycle if its ends are similar and the rest of
-the clip only repeats it, its turns included.
+The distance d of two frames is that of `laps`. A part of the clip is its cycle if its ends are similar, with feet that
+stand at both in one place relative to the root, and the rest of the clip only repeats it, its turns included.
 """
 
 from typing import NamedTuple
@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import Array, IntArray, Mask
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.mirror import mirrored
-from models.mocap.preparation.laps import best_lap, frame_distances
+from models.mocap.preparation.laps import MAX_FOOT_GAP, best_lap, foot_gaps, frame_distances
 
 # Largest d between the ends of a gait cycle, and of a cycle in place [rad]; walks have 0.1 to 0.3. Half the first loops
 # two of 17 captures differently, twice the first loops one; half the second changes none, twice the second takes a
@@ -72,18 +73,12 @@ def find_cycle(clip: Clip) -> Cycle | None:
     distances, headings = frame_distances(clip, frames)
     lap = best_lap(clip)
     speeds = np.sqrt(np.mean(clip.velocities()[frames, 6:] ** 2, axis=1))
-    candidates: list[tuple[int, int, float, float]] = []
-    if lap.clip.n_frames < clip.n_frames:
-        candidates.append((round(lap.start * clip.fps), round(lap.end * clip.fps), lap.gap, _MAX_GAIT_GAP))
-    shortest = max(_MIN_CYCLE_TIME * clip.fps, _MIN_CYCLE_FRACTION * clip.n_frames)
-    candidates_apart = np.where(frames[None, :] - frames[:, None] >= shortest, distances, np.inf)
-    if np.isfinite(candidates_apart).any():
-        i, j = np.unravel_index(int(np.argmin(candidates_apart)), candidates_apart.shape)
-        candidates.append((int(frames[i]), int(frames[j]), float(candidates_apart[i, j]), _MAX_IN_PLACE_GAP))
-    for start, end, gap, max_gap in candidates:
+
+    def repeated(start: int, end: int, gap: float, max_gap: float) -> Cycle | None:
+        """The part from start to end if its ends are similar and the rest of the clip repeats it."""
         inside = (frames >= start) & (frames <= end)
         if inside.sum() < 2:
-            continue  # shorter than two steps of the comparison
+            return None  # shorter than two steps of the comparison
         yaw_rate = np.diff(headings[inside][[0, -1]]) / (frames[inside][-1] - frames[inside][0])
         nearest = distances[:, inside].min(axis=1)
         turns = _least_joint_turns(clip.poses[frames], inside)
@@ -93,9 +88,25 @@ def find_cycle(clip: Clip) -> Cycle | None:
         moving = speeds[inside].mean() >= _MIN_SPEED_RATIO * speeds.mean()
         complete = covered.mean() >= _MIN_COVERED_FRACTION
         complete &= np.mean((nearest > _MAX_UNLIKE_DISTANCE) | gesture) <= _MAX_UNLIKE_FRACTION
-        if gap < max_gap and moving and complete:
-            since = float(frames[np.argmax(unlike)]) / clip.fps if unlike.any() else 0.0
-            return Cycle(start, end, gap, LeftOut(float(unlike.mean() * clip.duration), since))
+        if not (gap < max_gap and moving and complete):
+            return None
+        since = float(frames[np.argmax(unlike)]) / clip.fps if unlike.any() else 0.0
+        return Cycle(start, end, gap, LeftOut(float(unlike.mean() * clip.duration), since))
+
+    feet_agree = foot_gaps(clip, contacts(clip).planted, frames) < MAX_FOOT_GAP
+    if lap.clip.n_frames < clip.n_frames:
+        start, end = round(lap.start * clip.fps), round(lap.end * clip.fps)
+        cycle = repeated(start, end, lap.gap, _MAX_GAIT_GAP)
+        if cycle is not None and feet_agree[start // frame_step, end // frame_step]:
+            return cycle
+    apart = frames[None, :] - frames[:, None] >= max(_MIN_CYCLE_TIME * clip.fps, _MIN_CYCLE_FRACTION * clip.n_frames)
+    for pairs in (apart, apart & feet_agree):
+        if not pairs.any():
+            return None
+        i, j = np.unravel_index(int(np.argmin(np.where(pairs, distances, np.inf))), pairs.shape)
+        cycle = repeated(int(frames[i]), int(frames[j]), float(distances[i, j]), _MAX_IN_PLACE_GAP)
+        if cycle is None or feet_agree[i, j]:
+            return cycle
     return None
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.flights.ballistics import clip_ballistics, clip_flights
+from experiments.preparation.command import foot_slide
 from experiments.preparation.prepared_file import PreparedFile, changes, doubts, losses
 from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
@@ -16,6 +17,7 @@ from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.fidelity import fidelity
 from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.pace import Paced
+from models.mocap.preparation.poses import resampled
 from models.mocap.preparation.prepare import HandLoad, Prepared, prepared
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
@@ -109,11 +111,13 @@ def test_lines_are_in_the_order_of_importance(near):
     bent = replace(sound, excess=0.1, bent="left_knee", strain=1.2)
     faulty = replace(bent, residual=0.2, skate=0.02, depth=0.03, highest=0.02)
     far = result.fidelity._replace(joints=0.2)
-    outcome = PreparedFile(result._replace(fidelity=far), faulty, Followed(0.1, 2.5, 20.0, 1.0), ("flight at 1 s",), ())
+    falls = Followed(0.1, 2.5, 20.0, 1.0)
+    outcome = PreparedFile(result._replace(fidelity=far), faulty, falls, 0.05, ("flight at 1 s",), ())
     first, *below = str(outcome).splitlines()
     assert first.startswith(f"{result.clip.name}: not well-formed; ")
     starts = [
         "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
+        "a foot slides by 50.0 mm along the floor; 30 at most",
         "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
         "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°",
         "try --loop START:END",
@@ -125,8 +129,17 @@ def test_lines_are_in_the_order_of_importance(near):
 
 def test_a_well_formed_clip_has_one_line_and_what_it_lacks():
     result = _made(None, near=True)
-    outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01, None, 20.0, 1.0), (), ())
+    outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01, None, 20.0, 1.0), 0.01, (), ())
     first, lost = str(outcome).splitlines()
     assert first.startswith(f"{result.clip.name}: well-formed; ")
     assert lost.endswith(": --loop open keeps its turns")
     assert not outcome.faults()
+
+
+def test_feet_that_cross_the_floor_without_a_step_slide():
+    poses = np.repeat(resampled(embedded("cheer"), 120.0).poses[:1], 60, axis=0)
+    still = foot_slide(Clip(poses, 120.0, "still"))
+    poses[:, 0] += 0.15 * np.clip((np.arange(60) - 30) / 6.0, 0.0, 1.0)
+    assert still < 1e-9
+    # The clip closes, since it moves by 0.15 m as a whole, and its next lap continues it.
+    assert foot_slide(Clip(poses, 120.0, "jump")) == pytest.approx(0.3, abs=0.001)

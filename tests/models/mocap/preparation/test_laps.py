@@ -8,7 +8,7 @@ import pytest
 from models.humanoid.skeleton import rest_pose
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.preparation.laps import best_lap
+from models.mocap.preparation.laps import best_lap, foot_gaps
 
 MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
 
@@ -70,3 +70,11 @@ def test_captured_gaits_have_laps_of_one_cycle(file: str, seconds: float, degree
     gaps_of_lap = pose_difference(lap.clip.displacement.moved(lap.clip.poses[0]), lap.clip.poses[-1])
     gaps_of_clip = pose_difference(clip.displacement.moved(clip.poses[0]), clip.poses[-1])
     assert np.linalg.norm(gaps_of_lap[6:]) <= np.linalg.norm(gaps_of_clip[6:])
+
+
+def test_places_of_feet_are_compared_where_they_stand_in_both_frames() -> None:
+    walk = embedded("walk")
+    gaps = foot_gaps(walk, np.ones((walk.n_frames, 2), dtype=bool), np.array([0, walk.n_frames - 1, 30]))
+    assert gaps[0, 1] < 1e-3
+    assert gaps[0, 2] > 0.2
+    assert not foot_gaps(walk, np.zeros((walk.n_frames, 2), dtype=bool), np.array([0, 30])).any()

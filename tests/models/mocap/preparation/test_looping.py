@@ -99,6 +99,20 @@ def test_gesture_of_one_arm_is_kept_or_told(angle, kept, turning):
     assert found.left_out == pytest.approx((0.0, 0.0) if kept else (1.3, 4.35), abs=0.15)
 
 
+def test_part_whose_standing_feet_end_at_another_place_is_no_cycle():
+    """Arms swing, and a foot is put 17 cm aside meanwhile: across the seam it would slide back."""
+    standing, time = resampled(embedded("cheer"), 120.0).poses[0], np.arange(300) / 120.0
+    swing, aside = np.zeros((300, 57)), np.zeros((300, 57))
+    for joint, sign in (("left_shoulder", 1.0), ("right_shoulder", -1.0)):
+        swing[:, 6 + 3 * JOINTS.index(joint)] = 0.8 * sign * np.sin(np.pi * time)
+    for joint, sign in (("left_hip", 1.0), ("left_ankle", -1.0)):
+        aside[:, 6 + 3 * JOINTS.index(joint)] = 0.2 * sign * np.clip((time - 0.8) / 0.25, 0.0, 1.0)
+    kinds = [close_or_rest(Clip(add_tangents(np.tile(standing, (300, 1)), t), 120.0, "arms")).kind
+             for t in (swing, swing + aside)]  # fmt: skip
+    assert kinds[0] == "cycle"
+    assert kinds[1] != "cycle"
+
+
 def test_looped_returns_a_closed_clip_unchanged(walks):
     assert close_or_rest(walks[0]).clip is walks[0]
 
