@@ -8,9 +8,7 @@ Between the pose and the motion is one step, v₀, that the motion does not cont
 - a body with straight legs and straight arms at least 30° off the trunk, as T- and A-poses are, whose step
   does not continue in the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
-  interpolation has spread the one step; for at most 0.25 s, if they are all in one direction and the largest is 3
-  times as large as the motion's;
-- steps that fade within 0.1 s after such a jump, followed by calm: a filter has spread the jump in this case, too;
+  interpolation has spread the one step; for at most 0.25 s, if the largest is 3 times as large as the motion's;
 - a first step as large as that of a broken frame at the end of a motion (`broken_frames.first_step_jumps`).
 
 The pose is held until the jump: it moves by less than a tenth of that.
@@ -35,11 +33,8 @@ _MIN_JUMP_ANGLE = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no b
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it continues.
 _MAX_BLEND_TIME, _MIN_BLEND_RATIO = 0.1, 1.5
-# The same of a jump that is spread over more time, all in one direction: 0.2 s and 4 to 9 in five files at 25 a second.
+# The same of a jump that is spread over more time: 0.2 s and 4 to 9 in five files at 25 a second.
 _MAX_SLOW_BLEND_TIME, _MIN_SLOW_BLEND_RATIO = 0.25, 3.0
-# In a jump that fades: largest ratio of the steps after it to its first step, and least cosine between its steps (0.96
-# and more in six captures). No motion begins with three such steps.
-_MAX_CALM_RATIO, _MIN_STEP_COSINE = 0.4, 0.9
 _MAX_HELD_RATIO = 0.1  # largest distance between a held pose and that before the jump, as a fraction of the jump
 # Of a calibration pose: largest bend of the limbs, and least angle of the arms to the trunk's sagittal plane.
 _MIN_STRAIGHT_COSINE, _MIN_OUTWARD_SINE = np.cos(np.deg2rad(20.0)), np.sin(np.deg2rad(30.0))
@@ -54,9 +49,7 @@ def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines
     turns = _rotation_vectors(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    jumped = _frames_before_fade(
-        turns, _frames_before_jump(rotations, turns, at_rest, lines), round(_MAX_BLEND_TIME * motion.fps)
-    )
+    jumped = _frames_before_jump(rotations, turns, at_rest, lines)
     begun, ended = _find_blend(rotations, turns, motion.fps)
     is_pose = at_rest[: begun + 1].all() or _is_calibration_pose(lines)
     frames = max(jumped, ended) if is_pose else jumped
@@ -84,27 +77,6 @@ def _frames_before_jump(rotations: Array, turns: Array, at_rest: Mask, lines: Bo
     return jump + 1 if leaves_zero_pose or leaves_posed_body else 0
 
 
-def _frames_before_fade(turns: Array, jumped: int, longest: int) -> int:
-    """Number of frames before a motion, if a filter has spread its jump from a pose; otherwise `jumped`.
-
-    The steps of the jump, all in one direction, fade, and the next ones are small.
-    """
-    if not jumped:
-        return 0
-    turns, steps = turns[jumped:], _rms_angle(turns[jumped:])
-    length = int(np.argmax(np.append(steps < _MAX_CALM_RATIO * steps[0], True)))
-    calm = steps[length : length + longest].max(initial=0.0) < _MAX_CALM_RATIO * steps[0]
-    fades = length > 2 and _are_straight(turns[:length]) and length <= longest and (np.diff(steps[:length]) < 0.0).all()
-    return jumped + length if fades and calm and steps[:length].sum() > 3.0 * _MIN_JUMP_ANGLE else jumped
-
-
-def _are_straight(turns: Array) -> bool:
-    """Whether consecutive steps (n, joints, 3) are all in one direction."""
-    steps = _rms_angle(turns)
-    cosines = np.sum(turns[:-1] * turns[1:], axis=(1, 2)) / turns.shape[1]
-    return bool((cosines > _MIN_STEP_COSINE * steps[:-1] * steps[1:]).all())
-
-
 def _find_blend(rotations: Array, turns: Array, fps: float) -> tuple[int, int]:
     """First step, and the one after the last, of a jump by steps that are all larger than the motion's; else (0, 0)."""
     steps = _rms_angle(turns)
@@ -120,8 +92,7 @@ def _find_blend(rotations: Array, turns: Array, fps: float) -> tuple[int, int]:
         ended = begun + int(np.argmin(np.append(large[begun:], False)))
         burst = steps[begun:ended]
         is_jump = len(burst) <= longest and burst.sum() > 3.0 * _MIN_JUMP_ANGLE and burst.max() > ratio * usual
-        is_spread = ratio == _MIN_BLEND_RATIO or _are_straight(turns[begun:ended])
-        if is_jump and is_spread and _is_held(rotations, begun, burst.max()):
+        if is_jump and _is_held(rotations, begun, burst.max()):
             return begun, ended
     return 0, 0
 

@@ -153,7 +153,7 @@ def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles,
     elif lines.is_single_pose and {"left_foot", "right_foot"} & roles.segments.keys():
         yield "the body holds one pose: the soles' orientation is estimated; give --rest-frame if they are level in it"
     if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
-        yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
+        yield "there is one arm: the chest's orientation is estimated"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 
