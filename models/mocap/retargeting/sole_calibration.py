@@ -136,7 +136,6 @@ def calibrated_foot(
     # A pose that is held has no mean ankle, and its feet may hang: whether they stand is decided by their toes.
     has_toes = bool(np.isfinite(ahead).all())
     expected = _normal_above_toes(ahead, np.cross(neutral, forward)) if single and has_toes else neutral
-    flat = flat if has_toes or len(source) > 1 else flat[:0]
     normal, used = _sole_normal(quaternions.rotated(inverse[flat], up), neutral, min(_MIN_FRAME_COUNT, len(source)))
     pitch_error = np.abs(np.arcsin(np.clip(-normal @ unit(ahead), -1.0, 1.0)) - _TOE_PITCH)
     is_flat = used >= MIN_FLAT_FRAMES and bool(pitch_error < _TOE_PITCH_TOLERANCE)
