@@ -28,7 +28,10 @@ _MIN_TOE_SINE = np.sin(np.deg2rad(30.0))  # least median sine between toes and s
 # Mean turn of both feet to one side of where the hips face, above which the tips of feet without toe joints are not
 # their toes: 9° at most in 20 captures of such rigs, 15° in 117 with toe joints but for one of style transfer.
 _MAX_TIP_TURN = np.deg2rad(30.0)
-_MIN_KNEE_BEND = 0.15  # least mean sine of the knees' bend that shows where the legs face, as in `upright`
+# Least mean sine of toes and knees, and distance of the wrists ahead of the shoulders [leg lengths], that show where a
+# body faces. Of 128 gestures before depth cameras, hands are 0.22 and more ahead in the 13 whose knees seem to bend
+# back by 9 to 24°; in a walk of a mirrored body they are behind.
+MIN_SIDE_EVIDENCE = 0.15
 
 
 class BodyLines(NamedTuple):
@@ -37,10 +40,9 @@ class BodyLines(NamedTuple):
     Attributes
     ----------
     hips, knees, ankles, shoulders, elbows, wrists, toes : array of shape (n, 2, 3)
-        Joints, left and right; NaN if the skeleton does not have them. Of a body with one arm, the other shoulder is
-        estimated.
+        Joints, left and right; NaN if the skeleton does not have them.
     top : array of shape (n, 3)
-        Upper end of the trunk: the middle of the shoulders or, without arms, the head or the chest.
+        Upper end of the trunk: the middle of the shoulders or, without both arms, the head or the chest.
     has_arms : bool
         Whether `top` is the middle of the shoulders.
     leg : float
@@ -141,8 +143,6 @@ def body_lines(motion: SourceMotion, roles: Roles, positions: Array, rotations: 
     substitute = roles.segments.get("head", roles.segments.get("chest"))
     hips, knees, ankles = pair("thigh"), ends_of("thigh", "shank"), ends_of("shank", "foot")
     shoulders = pair("upper_arm")
-    if substitute is not None:
-        shoulders = _with_missing_shoulder(shoulders, hips, positions[:, substitute])
     has_arms = not np.isnan(shoulders).any()
     if has_arms:
         top = shoulders.mean(axis=1)
@@ -178,7 +178,7 @@ def _tips_point_aside(lines: BodyLines) -> bool:
     ahead = unit(np.cross(left, shank))
     x, y = (np.sum(foot * axis, axis=2).mean() for axis in (ahead, np.cross(shank, ahead)))
     turn, bend = abs(np.arctan2(y, x)), np.sum(lines.knee_normals() * left, axis=2).mean()
-    return bool(turn > _MAX_TIP_TURN and (turn < np.pi - _MAX_TIP_TURN or bend > _MIN_KNEE_BEND))
+    return bool(turn > _MAX_TIP_TURN and (turn < np.pi - _MAX_TIP_TURN or bend > MIN_SIDE_EVIDENCE))
 
 
 def _check_extent(lines: BodyLines, motion: SourceMotion) -> None:
@@ -188,27 +188,6 @@ def _check_extent(lines: BodyLines, motion: SourceMotion) -> None:
         raise MotionFileError(motion.path, 0, "the legs have no length", "offsets of a human")
     if min(extent) < 1e-3 * extent[0] or np.median(_sine(lines.left, lines.trunk)) < 0.3:
         raise MotionFileError(motion.path, 0, "hips and spine do not span a body", "offsets of a human")
-
-
-def _with_missing_shoulder(shoulders: Array, hips: Array, upper: Array) -> Array:
-    """Shoulders (n, 2, 3) of a body with one arm: as far from the line hips to head as the other one, opposite to it.
-
-    Opposite is halfway between its mirror image, which an inclined neck turns, and the direction of the hips (n, 2, 3):
-    the chest of 20 captures without an arm turns by 4° in the median and 13° at most; by either alone up to 25 and 29°.
-    """
-    for k in range(len(SIDES)):
-        if np.isnan(shoulders[:, k]).any() and not np.isnan(shoulders[:, 1 - k]).any():
-            middle = hips.mean(axis=1)
-            axis = unit(upper - middle)
-            inwards = _perpendicular(middle - shoulders[:, 1 - k], axis)
-            across = unit(unit(inwards) + unit(_perpendicular(hips[:, k] - middle, axis)))
-            shoulders[:, k] = shoulders[:, 1 - k] + 2.0 * np.linalg.norm(inwards, axis=1, keepdims=True) * across
-    return shoulders
-
-
-def _perpendicular(vectors: Array, axis: Array) -> Array:
-    """Parts of vectors (n, 3) across unit vectors (n, 3)."""
-    return vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis
 
 
 def _foremost(tips: list[Array], hip: Array, knee: Array, ankle: Array) -> Array:

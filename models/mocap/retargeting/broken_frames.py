@@ -77,10 +77,19 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
     follows do not count. If the last step of a motion is that large, the last frame is broken and is left out, unless
     it is `rest`, a frame that is stated to show the rest pose.
     """
-    broken = np.zeros(motion.n_frames, dtype=bool)
     if motion.n_frames < MIN_FRAME_COUNT:
         return Repaired(motion, (), (), False, ())
-    used = used_joints(motion, roles)
+    motion, broken = _without_gaps(motion, roles)
+    shortened = rest != motion.n_frames - 1 and any(track.jumps(track.steps[::-1]) for track in _tracks(motion, roles))
+    if shortened:
+        motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
+    jumps, joints = _remaining_jumps(motion, roles)
+    return Repaired(motion, _indices(broken), jumps, shortened, joints)
+
+
+def _without_gaps(motion: SourceMotion, roles: Roles) -> tuple[SourceMotion, Mask]:
+    """The motion with short gaps interpolated, and the frames (n,) that were."""
+    broken, used = np.zeros(motion.n_frames, dtype=bool), used_joints(motion, roles)
     longest = max(1, int(_MAX_GAP_TIME * motion.fps))
     lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
     edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _MIN_JUMP_ANGLE))
@@ -98,11 +107,12 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
             broken[k + 1 : k + 1 + length] = True
         if len(found):
             motion, tracks = _interpolate(motion, broken), ()
-    shortened = rest != motion.n_frames - 1 and any(
-        track.jumps(track.steps[::-1]) for track in tracks or _tracks(motion, roles)
-    )
-    if shortened:
-        motion = replace(motion, rotations=motion.rotations[:-1], translations=motion.translations[:-1])
+    return motion, broken
+
+
+def _remaining_jumps(motion: SourceMotion, roles: Roles) -> tuple[tuple[int, ...], tuple[JointJump, ...]]:
+    """Frames after which the whole pose or its place jumps, and the jumps of single joints at other times."""
+    used = used_joints(motion, roles)
     steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
     jumping = (steps > np.maximum(_jump_limits(steps, 2), _MIN_JUMP_ANGLE)).mean(axis=1) >= _MIN_JOINT_FRACTION
     lost = motion.at_rest(used)
@@ -110,8 +120,7 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
     root = _root_positions(motion, roles)[:, 0]
     jumping |= _lasting_jumps(_distances(root[:-1], root[1:]), _MIN_ROOT_JUMP * _thigh_length(motion, roles))
     single = np.argwhere(_lasting_jumps(steps, _MIN_JUMP_ANGLE) & ~jumping[:, None])
-    joints = tuple(JointJump(int(k), used[i], float(steps[k, i])) for k, i in single)
-    return Repaired(motion, _indices(broken), _indices(jumping), shortened, joints)
+    return _indices(jumping), tuple(JointJump(int(k), used[i], float(steps[k, i])) for k, i in single)
 
 
 def first_step_jumps(motion: SourceMotion, roles: Roles) -> bool:

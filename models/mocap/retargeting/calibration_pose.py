@@ -5,16 +5,13 @@ Between the pose and the motion is one step, v₀, that the motion does not cont
 - a step far larger than any step of the motion;
 - zero rotations of all joints, as programs write the rig's rest pose: a motion that really begins in it continues from
   it, :math:`|v_0 - v_1| \le |v_1|` from a uniform motion up to one of constant jerk;
-- a body with straight legs and straight arms at least 30° off the trunk, symmetric as T- and A-poses are, whose step
+- a body with straight legs and straight arms at least 30° off the trunk, as T- and A-poses are, whose step
   does not continue in the next ones: :math:`|v_0 - v_1| > 2 \max(|v_1|, |v_2|, |v_3|)`;
 - zero rotations, or such a body, and first steps 1.5 times as large as the motion's, for at most 0.1 s: a filter or an
-  interpolation has spread the one step; for at most 0.25 s, if they are all in one direction and the largest is 3
-  times as large as the motion's;
-- steps that fade within 0.1 s after such a jump, followed by calm: a filter has spread the jump in this case, too;
+  interpolation has spread the one step; for at most 0.25 s, if the largest is 3 times as large as the motion's;
 - a first step as large as that of a broken frame at the end of a motion (`broken_frames.first_step_jumps`).
 
-The jump is sought in the first quarter of a motion. If a pose is held without any change, as no living body stands, the
-jump is sought where that ends, however late; such a pose is recognised only by its zero rotations or straight limbs.
+The pose is held until the jump: it moves by less than a tenth of that.
 
 The second and third criteria depend neither on the speed of the motion nor on its frame rate. |v| is the RMS over the
 joints that segments of the figure follow.
@@ -31,24 +28,16 @@ from models.mocap.retargeting.broken_frames import MIN_FRAME_COUNT, first_step_j
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 # Half or twice any of these values finds no such pose in 17 captures, none of which has one.
-_MAX_POSE_FRACTION = 0.25  # largest fraction of a motion that may be such a pose, unless it is held without any change
-# Largest step of a pose that does not change [rad], RMS over the joints: files have four decimals or more.
-_MAX_STILL_STEP = 1e-5
 _MIN_JUMP_RATIO = 5.0  # least ratio of the jump to the 99th percentile of the steps
 _MIN_JUMP_ANGLE = np.deg2rad(5.0)  # least jump, RMS over the joints [rad]: no body turns so far in a frame
 # Longest time over which the jump is spread [s], and least ratio of its steps to the 99th percentile: 0.04 and 1.6 to 8
 # in three captures that were filtered. No body begins faster than it continues.
 _MAX_BLEND_TIME, _MIN_BLEND_RATIO = 0.1, 1.5
-# The same of a jump that is spread over more time, all in one direction: 0.2 s and 4 to 9 in five files at 25 a second.
+# The same of a jump that is spread over more time: 0.2 s and 4 to 9 in five files at 25 a second.
 _MAX_SLOW_BLEND_TIME, _MIN_SLOW_BLEND_RATIO = 0.25, 3.0
-# In a jump that fades: largest ratio of the steps after it to its first step, and least cosine between its steps (0.96
-# and more in six captures). No motion begins with three such steps.
-_MAX_CALM_RATIO, _MIN_STEP_COSINE = 0.4, 0.9
 _MAX_HELD_RATIO = 0.1  # largest distance between a held pose and that before the jump, as a fraction of the jump
-# Of a calibration pose: bend of the limbs, difference of the sides, least angle of the arms to the trunk's line, and
-# largest angle of the arms to the trunk's frontal plane.
-_MIN_STRAIGHT_COSINE, _MIN_SYMMETRY_COSINE = np.cos(np.deg2rad([20.0, 12.0]))
-_MIN_OUTWARD_SINE, _MAX_FORWARD_SINE = np.sin(np.deg2rad([30.0, 25.0]))
+# Of a calibration pose: largest bend of the limbs, and least angle of the arms to the trunk's sagittal plane.
+_MIN_STRAIGHT_COSINE, _MIN_OUTWARD_SINE = np.cos(np.deg2rad(20.0)), np.sin(np.deg2rad(30.0))
 
 
 def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines) -> int:
@@ -60,12 +49,9 @@ def calibration_pose_length(motion: SourceMotion, roles: Roles, lines: BodyLines
     turns = _rotation_vectors(rotations[:-1], rotations[1:])
     root = ancestry(roles.segments["pelvis"], motion.parents)
     at_rest = motion.at_rest([joint for joint in used if joint not in root])
-    jumped = _frames_before_fade(
-        turns, _frames_before_jump(rotations, turns, at_rest, lines), round(_MAX_BLEND_TIME * motion.fps)
-    )
+    jumped = _frames_before_jump(rotations, turns, at_rest, lines)
     begun, ended = _find_blend(rotations, turns, motion.fps)
-    is_early = ended <= _MAX_POSE_FRACTION * motion.n_frames or _first_change(_rms_angle(turns)) == begun
-    is_pose = is_early and (at_rest[: begun + 1].all() or _is_calibration_pose(lines))
+    is_pose = at_rest[: begun + 1].all() or _is_calibration_pose(lines)
     frames = max(jumped, ended) if is_pose else jumped
     return frames or int(first_step_jumps(motion, roles))
 
@@ -74,49 +60,21 @@ def _frames_before_jump(rotations: Array, turns: Array, at_rest: Mask, lines: Bo
     """Number of frames before a jump from a calibration pose; 0 if there is none."""
     n = len(turns) + 1
     steps = _rms_angle(turns)
-    share, first_change = max(1, int(_MAX_POSE_FRACTION * n)), _first_change(steps)
-    early = steps[: max(share, first_change + 1)]
-    if early.max() < _MIN_JUMP_ANGLE:
+    if steps.max() < _MIN_JUMP_ANGLE:
         return 0
-    if n >= MIN_FRAME_COUNT and first_change < share:
-        jump = int(np.argmax(early))
+    if n >= MIN_FRAME_COUNT:
+        jump = int(np.argmax(steps))
         usual = float(np.quantile(np.delete(steps, jump), 0.99))
         # The pose must be held; if there is motion before the jump, the jump is a fault of the capture.
         if _is_held(rotations, jump, steps[jump]) and steps[jump] >= _MIN_JUMP_RATIO * usual:
             return jump + 1
-    jump = int(np.argmax(early >= _MIN_JUMP_ANGLE))
+    jump = int(np.argmax(steps >= _MIN_JUMP_ANGLE))
     if not _is_held(rotations, jump, steps[jump]) or jump + 1 >= n - 1:
         return 0
     departure = float(_rms_angle(turns[jump] - turns[jump + 1]))
     leaves_zero_pose = at_rest[: jump + 1].all() and not at_rest[jump + 1] and departure > steps[jump + 1]
     leaves_posed_body = _is_calibration_pose(lines) and departure > 2.0 * steps[jump + 1 : jump + 4].max()
     return jump + 1 if leaves_zero_pose or leaves_posed_body else 0
-
-
-def _frames_before_fade(turns: Array, jumped: int, longest: int) -> int:
-    """Number of frames before a motion, if a filter has spread its jump from a pose; otherwise `jumped`.
-
-    The steps of the jump, all in one direction, fade, and the next ones are small.
-    """
-    if not jumped:
-        return 0
-    turns, steps = turns[jumped:], _rms_angle(turns[jumped:])
-    length = int(np.argmax(np.append(steps < _MAX_CALM_RATIO * steps[0], True)))
-    calm = steps[length : length + longest].max(initial=0.0) < _MAX_CALM_RATIO * steps[0]
-    fades = length > 2 and _are_straight(turns[:length]) and length <= longest and (np.diff(steps[:length]) < 0.0).all()
-    return jumped + length if fades and calm and steps[:length].sum() > 3.0 * _MIN_JUMP_ANGLE else jumped
-
-
-def _first_change(steps: Array) -> int:
-    """Index of the first step in which the pose changes; the number of steps if there is none."""
-    return int(np.argmax(np.append(steps > _MAX_STILL_STEP, True)))
-
-
-def _are_straight(turns: Array) -> bool:
-    """Whether consecutive steps (n, joints, 3) are all in one direction."""
-    steps = _rms_angle(turns)
-    cosines = np.sum(turns[:-1] * turns[1:], axis=(1, 2)) / turns.shape[1]
-    return bool((cosines > _MIN_STEP_COSINE * steps[:-1] * steps[1:]).all())
 
 
 def _find_blend(rotations: Array, turns: Array, fps: float) -> tuple[int, int]:
@@ -134,8 +92,7 @@ def _find_blend(rotations: Array, turns: Array, fps: float) -> tuple[int, int]:
         ended = begun + int(np.argmin(np.append(large[begun:], False)))
         burst = steps[begun:ended]
         is_jump = len(burst) <= longest and burst.sum() > 3.0 * _MIN_JUMP_ANGLE and burst.max() > ratio * usual
-        is_spread = ratio == _MIN_BLEND_RATIO or _are_straight(turns[begun:ended])
-        if is_jump and is_spread and _is_held(rotations, begun, burst.max()):
+        if is_jump and _is_held(rotations, begun, burst.max()):
             return begun, ended
     return 0, 0
 
@@ -160,18 +117,9 @@ def _is_held(rotations: Array, last: int, jump: float) -> bool:
 def _is_calibration_pose(lines: BodyLines) -> bool:
     """Whether the body is in a T- or A-pose in the first frame."""
     left, trunk = unit(lines.left[0]), unit(lines.trunk[0])
-    bones = [unit((end - start)[0]) for start, end in (
+    upper, fore, thighs, shanks = (unit((end - start)[0]) for start, end in (
         (lines.shoulders, lines.elbows), (lines.elbows, lines.wrists), (lines.hips, lines.knees),
-        (lines.knees, lines.ankles))]  # fmt: skip
-    upper, fore, thighs, shanks = bones
+        (lines.knees, lines.ankles)))  # fmt: skip
     straight = np.concatenate((np.sum(upper * fore, axis=1), np.sum(thighs * shanks, axis=1), -(thighs @ trunk)))
-    arms, legs = upper - 2.0 * np.outer(upper @ left, left), thighs - 2.0 * np.outer(thighs @ left, left)
-    symmetry = np.array([arms[0] @ upper[1], legs[0] @ thighs[1]])  # each left limb's mirror image, and the right one
     outwards = (upper @ left) * (1.0, -1.0)
-    forwards = np.abs(upper @ unit(np.cross(left, trunk)))
-    return bool(
-        (straight > _MIN_STRAIGHT_COSINE).all()
-        and (symmetry > _MIN_SYMMETRY_COSINE).all()
-        and (outwards > _MIN_OUTWARD_SINE).all()
-        and (forwards < _MAX_FORWARD_SINE).all()
-    )
+    return bool((straight > _MIN_STRAIGHT_COSINE).all() and (outwards > _MIN_OUTWARD_SINE).all())

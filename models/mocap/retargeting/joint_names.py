@@ -6,7 +6,6 @@ export.
 """
 
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -33,9 +32,7 @@ _JAPANESE = {
 }  # fmt: skip
 _GLOSS = re.compile(r"[\[(].*?[\])]")  # Skyrim's NPC L Thigh [LThg]
 _PIECES = re.compile(r"[\W_]+")
-# Numbers stay with a single letter (the vertebrae L3 and T8 of Xsens): no program writes a side as L3.
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|[^\W\da-zA-Z_]+")
-_VERTEBRA = re.compile(r"[A-Z]\d+")
 
 
 class JointName(NamedTuple):
@@ -79,7 +76,8 @@ def joint_names(joints: tuple[str, ...], sided: frozenset[str], central: frozens
             split = [words[rest] if len(words) > 1 and words[end] == word else words for words in split]
     # MakeHuman's __UpLeg_L is the link from the pelvis to UpLeg_L.
     return tuple(
-        _parse(words, sided, _normalise(joint).startswith("__")) for words, joint in zip(split, joints, strict=True)
+        _parse(words, sided, _without_namespace(joint).startswith("__"))
+        for words, joint in zip(split, joints, strict=True)
     )
 
 
@@ -87,26 +85,21 @@ def _shared_word(split: Sequence[list[str]], end: int) -> str | None:
     """The first or last word of the names (`end` 0 or −1) that belongs to the skeleton's name, if there is one."""
     counts = Counter(words[end] for words in split if len(words) > 1)
     word, n = counts.most_common(1)[0] if counts else ("", 0)
-    has_meaning = word in _SIDES or (end == -1 and word in _HELPER_WORDS)
-    return None if n < _MIN_SHARED_FRACTION * len(split) or has_meaning else word
+    return None if n < _MIN_SHARED_FRACTION * len(split) or word in _SIDES else word
 
 
-def _normalise(name: str) -> str:
-    """A name without namespace, in the Unicode normal form NFKC."""
-    return unicodedata.normalize("NFKC", name).rsplit(":", 1)[-1].rsplit("|", 1)[-1]
+def _without_namespace(name: str) -> str:
+    return name.rsplit(":", 1)[-1]
 
 
 def _split_words(name: str) -> list[str]:
     """Words of a name in lower case, without namespace and numbers: ``ns:Bip01 L UpperArm`` → bip, l, upper, arm."""
-    name = _normalise(name)
+    name = _without_namespace(name)
     name = _GLOSS.sub("", name) or name
     for text, word in _JAPANESE.items():
         name = name.replace(text, f" {word} ")
     words: list[str] = []
     for piece in _PIECES.split(name):
-        if _VERTEBRA.fullmatch(piece):
-            words.append(piece.lower())
-            continue
         found = [word for word in _WORDS.findall(piece) if not word.isdecimal()]
         # LFArm is the left forearm (OptiTrack), LF_Arm the left arm.
         if len(found) > 1 and found[0] in ("LF", "RF"):

@@ -15,6 +15,7 @@ from geometry import quaternions
 from geometry.arrays import Array
 from geometry.quaternions import unit
 from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.retargeting.straight_bones import MAX_DISTANCE_RATIO
 
 ARM_RATIOS = (0.4, 0.85)  # length of the arms over that of the legs, without hands and feet: 0.54 to 0.72 in captures
 _SAMPLE_COUNT = 120  # frames in which bones are measured
@@ -22,9 +23,7 @@ _SAME_PLACE_RATIO = 0.01  # distance of joints at one place over the length of t
 # Distance of a joint before a bone from the bone's first joint, over its length, up to which the bone begins at the
 # outer one: a joint in the buttock has 0.08, twist joints have 0.25 and more.
 NEAR_RATIO = 0.12
-# Largest distance of a joint within a bone from the bone's line, over its length, as in `straight_bones`, and largest
-# range of its bend: a wrist that is captured bends by more.
-_MAX_OFFSET_RATIO, _MAX_BEND_RANGE = 0.07, np.deg2rad(4.0)
+_MAX_BEND_RANGE = np.deg2rad(4.0)  # largest range of the bend at a joint within a bone: a captured wrist has more
 # Length of the lower bone over the upper one, 0.65 to 1.15 in captures; and the likeliest one, for a wrist that does
 # not bend: the next joint of the hand is at 1.3.
 _LOWER_BONE_RATIOS, _LOWER_BONE_RATIO = (0.6, 1.5), 0.95
@@ -202,4 +201,4 @@ def _is_bone(nodes: Sequence[int], places: Array) -> bool:
     moments = np.linalg.norm(np.cross(points[:, 1:-1] - points[:, :1], bone), axis=2)
     offsets = moments / np.maximum(np.sum(bone * bone, axis=2), np.finfo(float).tiny)
     ranges = np.subtract(*np.quantile(bends, (0.95, 0.05), axis=0))
-    return bool(ranges.max() < _MAX_BEND_RANGE and np.quantile(offsets, 0.95, axis=0).max() < _MAX_OFFSET_RATIO)
+    return bool(ranges.max() < _MAX_BEND_RANGE and np.quantile(offsets, 0.95, axis=0).max() < MAX_DISTANCE_RATIO)

@@ -19,6 +19,7 @@ from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.abdomen import with_abdomen
 from models.mocap.retargeting.arm_twist import with_twist_shared
+from models.mocap.retargeting.body_checks import check_biped, check_sides
 from models.mocap.retargeting.body_lines import BodyLines, body_lines
 from models.mocap.retargeting.broken_frames import repair_frames
 from models.mocap.retargeting.calibration import Calibration, calibrate
@@ -42,7 +43,7 @@ from models.mocap.retargeting.retarget_report import (
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
 from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import check_biped, check_sides, unsupported_time, up_axis
+from models.mocap.retargeting.upright import unsupported_time, up_axis
 
 _X, _Z = np.eye(3)[[0, 2]]
 _NO_HINTS = Hints()

@@ -16,10 +16,9 @@ from models.mocap.retargeting.body_lines import SIDES, BodyLines
 from models.mocap.retargeting.broken_frames import JointJump
 from models.mocap.retargeting.calibration import Calibration
 from models.mocap.retargeting.skeleton_roles import Roles
+from models.mocap.retargeting.sole_calibration import MIN_FLAT_FRAMES
 
 _MAX_SPINE_BEND = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
-# Least number of stance frames for a reliable sole: with fewer, it differs by up to 25° on legs 0.6 to 1.6 as long.
-_MIN_STANCE_FRAMES = 8
 _MAX_NAMED = 12  # largest number of unused joints that are named: rigs with faces and fingers have hundreds
 # Least excess over joint ranges that is reported: their SD is 5 to 9° (Boone & Azen 1979).
 _MIN_RANGE_EXCESS = np.deg2rad(15.0)
@@ -146,7 +145,7 @@ def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles,
     few = [
         f"of the {side} one {count or 'none'}"
         for side, count in zip(SIDES, calibrated.stances, strict=True)
-        if count < min(_MIN_STANCE_FRAMES, n) and f"{side}_foot" in roles.segments
+        if count < min(MIN_FLAT_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     if few:
         remark = "the soles' orientation is estimated from few frames"
@@ -154,7 +153,7 @@ def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles,
     elif lines.is_single_pose and {"left_foot", "right_foot"} & roles.segments.keys():
         yield "the body holds one pose: the soles' orientation is estimated; give --rest-frame if they are level in it"
     if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
-        yield "there is one arm: the chest's orientation is estimated, with the other shoulder taken to be opposite"
+        yield "there is one arm: the chest's orientation is estimated"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 

@@ -2,8 +2,8 @@
 
 The legs are the longest two limbs that are alike and leave one joint, the arms two shorter ones that leave another
 (`limbs_by_shape`); several such limbs, as of a spider, a skirt or wings, are refused. With these, everything else is
-judged as for named skeletons: the vertical, the bones, and that it is no animal (`upright`, `straight_bones`). The
-trunk is upright at times, and hips, shoulders and trunk are in proportion to the legs.
+judged as for named skeletons: the vertical, and that it is no animal (`upright`, `body_checks`). The trunk is upright
+at times, and hips, shoulders and trunk are in proportion to the legs.
 
 Left is where the body says: toes and knees point ahead, elbows back, and hands are held out ahead (`side_evidence`).
 Two of these four decide, or knees that are bent far; none may contradict, nor may the side in a joint's name.
@@ -17,7 +17,8 @@ from geometry.arrays import Array
 from geometry.quaternions import unit
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import SIDES, BodyLines, body_lines
+from models.mocap.retargeting.body_checks import check_biped, side_evidence
+from models.mocap.retargeting.body_lines import MIN_SIDE_EVIDENCE, SIDES, BodyLines, body_lines
 from models.mocap.retargeting.joint_names import JointName
 from models.mocap.retargeting.limbs_by_shape import (
     ARM_RATIOS,
@@ -30,8 +31,7 @@ from models.mocap.retargeting.limbs_by_shape import (
     tree_of,
 )
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry, assembled, joints_below, names_of
-from models.mocap.retargeting.straight_bones import check_bones
-from models.mocap.retargeting.upright import AXES, check_biped, check_sides, side_evidence, up_axis
+from models.mocap.retargeting.upright import AXES, up_axis
 
 _MAX_PAIR_COUNT = 24  # of pairs of limbs: captures have up to 4
 _SEVERAL = "several limbs might be its legs or arms"
@@ -41,9 +41,8 @@ _HIP_RATIOS, _SHOULDER_RATIOS, _TRUNK_RATIOS = (0.08, 0.5), (0.2, 0.9), (0.35, 1
 _MIN_LEAD = 1.25
 _MIN_STANDING_COSINE = 0.8  # of the trunk to the vertical, in a fifth of the frames
 _MIN_SHOULDER_COSINE = 0.5  # mean cosine of shoulders and hips
-# Least evidence of a side, and of knees alone: depth cameras see straight knees bend back by up to 24°, with a sine of
-# 0.4.
-_MIN_EVIDENCE, _MIN_KNEE_EVIDENCE = 0.15, 0.45
+# Least evidence of knees alone: depth cameras see straight knees bend back by up to 24°, with a sine of 0.4.
+_MIN_KNEE_EVIDENCE = 0.45
 _MAX_NECK_JOINTS = 4  # that bend, from the chest to the head: two or three in most rigs, four in MakeHuman's
 _MAX_HEAD_DEPTH = 0.1  # of the head's joint below the shoulders [leg lengths]: DeepMimic's is at their height
 _MAX_HELPER_RATIO = 0.25  # distance of helpers from a joint of the neck over that of the next joint
@@ -120,14 +119,12 @@ def _body_roles(
         choices.append((named, roles, body_lines(motion, roles, positions, rotations)))
     named, roles, lines = choices[0 if _has_true_sides(choices[0][2]) else 1]
     _check_proportions(lines)
-    check_bones(motion, roles, positions)
     check_biped(motion, lines)
     body = joints_below(roles.segments["pelvis"], motion.parents)
     vertical = up_axis(motion, roles, lines, positions[:, body], up)
     # With arms longer than legs, these seem to be exchanged, in a body that hangs upside down.
     if np.isfinite(vertical.confidence) and not any((vertical.axis == AXES[name]).all() for name in ("+Y", "+Z")):
         raise _Unclear("up would be an axis that programs do not write: --up states it")
-    check_sides(motion, lines)
     if np.quantile(unit(lines.trunk) @ vertical.axis, 0.8) < _MIN_STANDING_COSINE:
         raise _Unclear("its trunk is hardly ever upright")
     names = names_of(motion.joints)
@@ -140,7 +137,7 @@ def _body_roles(
 def _has_true_sides(lines: BodyLines) -> bool:
     """Whether left and right are as in `lines`, rather than exchanged."""
     evidence = side_evidence(lines)
-    clear = [value for value in evidence if abs(value) > _MIN_EVIDENCE]
+    clear = [value for value in evidence if abs(value) > MIN_SIDE_EVIDENCE]
     if len({value > 0.0 for value in clear}) != 1 or (len(clear) < 2 and abs(evidence.knees) < _MIN_KNEE_EVIDENCE):
         raise _Unclear("toes, knees and arms do not show which side is left")
     return clear[0] > 0.0

@@ -31,13 +31,13 @@ _ARM = {
 }  # fmt: skip
 LIMBS = (tuple(_LEG), (*_ARM, "hand"))  # parts from the trunk out
 _HAND = ("fingerbase", "hand")  # beyond the wrist
-_CHEST = frozenset(("chest", "upperchest", "thorax", "torso", "spine", "upperbody", "t8"))
+_CHEST = frozenset(("chest", "upperchest", "thorax", "torso", "spine", "upperbody"))
 _NECK = frozenset(("neck", "lowerneck", "upperneck", "necklower", "neckupper", "necktwist"))
 _SIDED_WORDS = frozenset(word for limb in (_LEG, _ARM) for words in limb.values() for word in words) | {*_HAND}
 _CENTRAL_WORDS = _CHEST | _NECK | {"head"}
 _OPTIONAL_PARTS = ("clavicle", "toe")  # parts without which a limb is complete
-# Costs of a limb's chain, in decreasing priority: each exceeds all sums of the next; the last is 1 a level of depth.
-_MISSING_COST, _LEAF_COST, _RANK_COST, _STILL_COST = 100_000_000, 10_000_000, 100_000, 10_000
+# Costs of a limb's chain, in decreasing priority: each exceeds all sums of the next.
+_MISSING_COST, _RANK_COST, _STILL_COST = 10_000, 100, 1
 
 
 class Roles(NamedTuple):
@@ -133,7 +133,7 @@ def assembled(named: dict[str, int], names: tuple[JointName, ...], parents: tupl
         if named[f"{side}_thigh"] not in ancestry(named[f"{side}_shank"], parents)[1:]:
             return f"{side}_shank below its thigh"
     pelvis = named.get("pelvis", _meeting_point(named["left_thigh"], named["right_thigh"], parents))
-    if pelvis is None or any(part != "pelvis" and joint == pelvis for part, joint in named.items()):
+    if pelvis is None:
         return "pelvis"
     segments = {"pelvis": pelvis} | {part: named[part] for part in BODIES if part in named}
     spine = _find_spine(pelvis, named, names, parents)
@@ -167,11 +167,10 @@ def _find_limb(
 ) -> dict[str, int]:  # fmt: skip
     """The likeliest joints of a limb's parts, each below the one before.
 
-    Of all such chains, the one with the fewest missing parts; then the one with the fewest leaves, with words that mean
-    only their part, that moves, and nearest to the root. Two joints with one word (``thigh.L``, ``thigh.L.001``) are
-    one part.
+    Of all such chains, the one with the fewest missing parts; then the one with words that mean only their part, that
+    moves, and that comes first in the file. Two joints with one word (``thigh.L``, ``thigh.L.001``) are one part.
     """
-    parent_joints, parts = set(parents), tuple(limb)
+    parts = tuple(limb)
     above = {k: set(ancestry(k, parents)[1:]) for k, name in enumerate(names) if name.side == side}
     missing_costs = [_MISSING_COST * (1 if part in _OPTIONAL_PARTS else 10) for part in parts]
     # Chains that begin at a part: its index, the cost, and the parts' joints.
@@ -186,9 +185,7 @@ def _find_limb(
                 for first, cost, chain in chains
                 if not chain or (joint in above[chain[0][1]] and names[joint].bare != names[chain[0][1]].bare)
             )
-            leaf = _LEAF_COST if k < len(parts) - 1 else 1  # where a limb ends, a leaf is as likely
-            cost += leaf * (joint not in parent_joints) + _RANK_COST * (2 * rank + names[joint].noisy)
-            cost += _STILL_COST * (joint in still) + len(above[joint])
+            cost += _RANK_COST * (2 * rank + names[joint].noisy) + _STILL_COST * (joint in still)
             longer.append((k, cost, ((f"{side}_{parts[k]}", joint), *rest)))
         chains += longer
     return dict(min((cost + sum(missing_costs[:first]), chain) for first, cost, chain in chains)[1])
@@ -214,7 +211,7 @@ def _find_spine(
     chest = named.get("chest", _meeting_point(arms[0], arms[1], parents) if len(arms) == 2 else None)
     if chest is None and len(arms) < 2:
         trunk = [k for k in free if names[k].bare in _CHEST and not names[k].side and k != pelvis]
-        chest = max(trunk, key=lambda k: (k in parents, len(ancestry(k, parents))), default=None)
+        chest = max(trunk, key=lambda k: len(ancestry(k, parents)), default=None)
     if chest is None or chest == pelvis:
         return []
     down = ancestry(chest, parents)
@@ -233,7 +230,7 @@ def _find_head(
     free = [k for k in _unassigned_joints(named, parents) if not names[k].side]
     heads = [k for k in free if names[k].bare == "head"]
     if heads:
-        return min(heads, key=lambda k: (k not in parents, names[k].noisy, len(ancestry(k, parents))))
+        return heads[0]
     if necks := [k for k in free if names[k].bare in _NECK]:
         return max(necks, key=lambda k: len(ancestry(k, parents)))
     words = {names[k].bare for k in spine} - {""}

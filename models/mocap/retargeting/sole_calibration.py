@@ -26,11 +26,13 @@ _NORMAL_TOLERANCE = np.deg2rad(5.0)
 _MAX_SOLE_ANGLE = np.deg2rad(35.0)
 # Angle of the line from ankle to toes below the sole's plane [rad]: median 21°, 15 to 28° in half of 329 feet.
 _TOE_PITCH = np.deg2rad(21.0)
-# A sole lies flat if its toes differ from `_TOE_PITCH` by less than the first value in at least the second number of
-# stance frames; the third is then the largest angle to the expected normal. In held lunges, ankles are bent throughout:
-# in five feet of some 720 captures by 37 to 59°, with toes 3 to 15° off. Feet at such angles in lying bodies have toes
-# 16 to 28° off, or rest for only 3 or 4 frames.
-_TOE_PITCH_TOLERANCE, _MIN_FLAT_FRAMES, _MAX_BENT_SOLE_ANGLE = np.deg2rad(16.0), 8, np.deg2rad(65.0)
+# Least number of stance frames for a reliable sole: with fewer, it differs by up to 25° on legs 0.6 to 1.6 as long.
+MIN_FLAT_FRAMES = 8
+# A sole that is reliable lies flat if its toes differ from `_TOE_PITCH` by less than the first value; the second is
+# then the largest angle to the expected normal. In held lunges, ankles are bent throughout: in five feet of some 720
+# captures by 37 to 59°, with toes 3 to 15° off. Feet at such angles in lying bodies have toes 16 to 28° off, or rest
+# for only 3 or 4 frames.
+_TOE_PITCH_TOLERANCE, _MAX_BENT_SOLE_ANGLE = np.deg2rad([16.0, 65.0])
 # Mean-shift iterations to the mode of a sole's normals: half or twice changes none of 17 captures.
 _MEAN_SHIFT_COUNT = 20
 # Standard deviation of a sole's inclination about that of the mean ankle: half or twice turns the joints of 19 captures
@@ -134,10 +136,9 @@ def calibrated_foot(
     # A pose that is held has no mean ankle, and its feet may hang: whether they stand is decided by their toes.
     has_toes = bool(np.isfinite(ahead).all())
     expected = _normal_above_toes(ahead, np.cross(neutral, forward)) if single and has_toes else neutral
-    flat = flat if has_toes or len(source) > 1 else flat[:0]
     normal, used = _sole_normal(quaternions.rotated(inverse[flat], up), neutral, min(_MIN_FRAME_COUNT, len(source)))
     pitch_error = np.abs(np.arcsin(np.clip(-normal @ unit(ahead), -1.0, 1.0)) - _TOE_PITCH)
-    is_flat = used >= _MIN_FLAT_FRAMES and bool(pitch_error < _TOE_PITCH_TOLERANCE)
+    is_flat = used >= MIN_FLAT_FRAMES and bool(pitch_error < _TOE_PITCH_TOLERANCE)
     if used == 0 or normal @ expected < np.cos(_MAX_BENT_SOLE_ANGLE if is_flat else _MAX_SOLE_ANGLE):
         normal, used = expected, 0
     x = ahead - normal * (ahead @ normal)

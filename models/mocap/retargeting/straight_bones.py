@@ -12,7 +12,7 @@ from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
 # Largest distance from the bone, as a fraction of its length: 0.05 in MakeHuman's thighs, less in other rigs with twist
 # joints. A joint between pelvis and hip that is taken for the thigh has 0.08 to 0.12.
-_MAX_DISTANCE_RATIO = 0.07
+MAX_DISTANCE_RATIO = 0.07
 
 
 def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
@@ -42,7 +42,7 @@ def check_bones(motion: SourceMotion, roles: Roles, positions: Array) -> None:
             if joint == start:
                 break
             moment = np.linalg.norm(np.cross(positions[:, joint] - positions[:, start], bone), axis=1)
-            if np.median(moment) > _MAX_DISTANCE_RATIO * np.median(length) ** 2:
+            if np.median(moment) > MAX_DISTANCE_RATIO * np.median(length) ** 2:
                 name, known = motion.joints[joint], f"{motion.joints[start]} and {motion.joints[end]}"
                 what = f"the {part.replace('_', ' ')} bends at {name}, between {known}"
                 raise MotionFileError(motion.path, 0, what, "known names, or --roles FILE")

@@ -1,4 +1,4 @@
-r"""Estimation of a file's vertical axis from the motion, with a confidence, and a check for mirrored bodies.
+r"""Estimation of a file's vertical axis from the motion, with a confidence.
 
 Each of the file's six axes u is scored: the body should stand along u, not climb along u, and have its weight over its
 lowest joints,
@@ -27,10 +27,11 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.arrays import Array, IntArray, Mask
+from geometry.quaternions import unit
 from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines, unit
+from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines
 from models.mocap.retargeting.skeleton_roles import Roles
 
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
@@ -71,16 +72,6 @@ _MIN_ALONG_COSINE = 0.8  # least cosine of the zero pose, and of the trunk of a 
 _MAX_LYING_HEIGHT = 0.5  # largest height of a lying body [leg lengths]: 0.2 and 0.3 in two captures
 _SAMPLE_COUNT = 200  # number of frames that are evaluated
 _DIRECTION_COUNT = 16  # directions in which the hull of the bearing joints is bounded
-# Least length of an animal's trunk [leg lengths] (1.0 in two elephants, 1.2 to 1.4 in 12 dogs), and largest mean cosine
-# between trunk and legs if it is across them: 0.16 in these, and 0.84 and more in ten human skeletons of another
-# make, with trunks of 0.7 to 1.3.
-_MIN_ANIMAL_TRUNK, _MAX_ANIMAL_COSINE = 0.8, 0.5
-# Least mean sine of the knees' bend, and cosine of the toes' direction, that distinguish left from right.
-_MIN_EVIDENCE = 0.15
-# Least mean distance of the wrists ahead of the shoulders [leg lengths] that shows where a body faces. Of 128 gestures
-# before depth cameras 0.22 and more in the 13 whose knees seem to bend back by 9 to 24°; a walk of a mirrored body has
-# less than 0.
-_MIN_REACH = 0.15
 
 
 class Up(NamedTuple):
@@ -271,86 +262,3 @@ def unsupported_time(lines: BodyLines, positions: Array, up: Array, fps: float) 
     """
     beside = _distance_outside(lines, positions, np.arange(len(positions)), up) > _MIN_PROPPED_DISTANCE * lines.leg
     return sum(end - start for start, end in spans(beside) if end - start > _MIN_PROPPED_TIME * fps) / fps
-
-
-def check_biped(motion: SourceMotion, lines: BodyLines) -> None:
-    """Refuse an animal with a human's joint names: its trunk is about as long as the legs, and across them throughout.
-
-    Raises
-    ------
-    MotionFileError
-        If the body is an animal's.
-    """
-    length = float(np.median(np.linalg.norm(lines.trunk, axis=1))) / lines.leg
-    whole = lines.has_arms and not np.isnan(lines.ankles).any()
-    legs = unit((lines.hips - lines.ankles).mean(axis=1))
-    if (
-        whole
-        and length > _MIN_ANIMAL_TRUNK
-        and float(np.sum(unit(lines.trunk) * legs, axis=1).mean()) < _MAX_ANIMAL_COSINE
-    ):
-        what = f"the trunk is {length:.1f} times as long as thigh and shank, and across the legs"
-        raise MotionFileError(motion.path, 0, what, "a human, who stands at times")
-
-
-def check_sides(motion: SourceMotion, lines: BodyLines) -> None:
-    """Refuse a mirrored body: hips and trunk define left, which toes, the bend of the knees and the arms must confirm.
-
-    Depth cameras see straight knees bend back: they alone show nothing if hands are held out to where the body faces.
-
-    Raises
-    ------
-    MotionFileError
-        If toes and knees show a mirrored body, if one of them does while the other is unclear or contradicts it, or if
-        left and right of the shoulders are on average opposite to the hips': no trunk is twisted by more than 90°
-        throughout.
-    """
-    evidence = side_evidence(lines)
-    signs = (evidence.toes, evidence.knees)
-    clear = [np.sign(s) for s in signs if abs(s) > _MIN_EVIDENCE]
-    stated = "left and right as named, or --roles FILE"
-    shoulders = lines.shoulders[:, 0] - lines.shoulders[:, 1]
-    if lines.has_arms and np.sum(lines.left * shoulders) < 0.0:
-        which = "legs" if sum(clear) < 0 else "arms" if sum(clear) > 0 else "arms or legs"
-        what = f"left and right of the {which} are exchanged: shoulders and hips point opposite ways"
-        raise MotionFileError(motion.path, 0, what, stated)
-    if abs(signs[0]) <= _MIN_EVIDENCE and evidence.hands > _MIN_REACH:
-        return
-    if clear and sum(clear) < 0:
-        back = " and ".join(part for part, sign in zip(("toes", "knees"), signs, strict=True) if sign < -_MIN_EVIDENCE)
-        raise MotionFileError(motion.path, 0, f"the body is mirrored: {back} point back", stated)
-    if clear and sum(clear) == 0:
-        raise MotionFileError(
-            motion.path, 0, "toes and knees point opposite ways", "a body that bends its knees forwards"
-        )
-
-
-class SideEvidence(NamedTuple):
-    """How far a body points to where it faces if left and right are as named; 0 for parts that it lacks.
-
-    Attributes
-    ----------
-    toes, knees : float
-        Mean sines by which toes and knees point ahead.
-    elbows : float
-        Mean sine by which elbows point back.
-    hands : float
-        Mean distance of the wrists ahead of the shoulders [leg lengths].
-    """
-
-    toes: float
-    knees: float
-    elbows: float
-    hands: float
-
-
-def side_evidence(lines: BodyLines) -> SideEvidence:
-    """Evidence for the sides of a body."""
-    left = unit(lines.left)
-    # Ahead of each foot's own shank: in the world, the toes of a kneeling body point back.
-    ahead = unit(np.cross(left[:, None], unit(lines.knees - lines.ankles)))
-    toes = np.sum(unit(lines.toes - lines.ankles) * ahead, axis=2)
-    knees, elbows = lines.knee_normals() @ left[:, :, None], -lines.elbow_normals() @ left[:, :, None]
-    hands = np.sum((lines.wrists - lines.shoulders) * np.cross(left, unit(lines.trunk))[:, None], axis=2) / lines.leg
-    parts = (toes, knees, elbows, hands)
-    return SideEvidence(*(float(np.nanmean(part)) if np.isfinite(part).any() else 0.0 for part in parts))

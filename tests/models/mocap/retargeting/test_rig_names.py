@@ -187,7 +187,7 @@ def test_joints_of_vendor_rigs_get_the_expected_roles(rig):
     ("joint", "side", "bare"),
     [
         ("LFArm", "left", "farm"), ("LF_Arm", "left", "arm"), ("LfArm", "left", "arm"), ("lfemur", "left", "femur"),
-        ("L3", "", "l3"), ("leg", "", "leg"), ("ns:rThighBend", "right", "thigh"), ("collar", "", "collar"),
+        ("leg", "", "leg"), ("ns:rThighBend", "right", "thigh"), ("collar", "", "collar"),
         ("RightUpLeg_055", "right", "upleg"), ("rightforearm", "right", "forearm"), ("lball", "left", "ball"),
         ("Head_M", "", "head"), ("左ひざ", "left", "knee"), ("thigh_stretch.l", "left", "thigh"), ("001", "", ""),
     ],
