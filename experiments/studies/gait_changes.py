@@ -22,7 +22,7 @@ from controllers.state import stylus_path
 from experiments.files.map_files import load_figure_map
 from experiments.fitting.verdict import FPS
 from experiments.preparation.tracking_trial import Followed, followed
-from experiments.setups.modes.lifted_runs import CROSS_RATE, curve_number
+from experiments.setups.modes.lifted_runs import CROSS_RATE, EASE_TIME, curve_number
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
 from models.mocap.motion.clip import Clip
@@ -32,7 +32,7 @@ from sim.reference.reference import map_poses
 
 CROSSING_TIME = 0.35
 """Duration of a hand's change of place [s]."""
-MANNERS = ((math.inf, 0.35), (math.inf, 1.0), (CROSS_RATE, 1.0))
+MANNERS = ((math.inf, 0.35), (math.inf, EASE_TIME), (CROSS_RATE, EASE_TIME))
 """Rates ω with which the figure follows across [1/s], and durations of the change of pace [s]."""
 ANGLES = tuple(np.arange(0.0, 2.0 * np.pi, np.pi / 3.0))
 """Angles of the lap at which changes begin [rad]."""

@@ -10,7 +10,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.transitions import MapTransition
 from controllers.state import stylus_path
 from experiments.config.modes import Rivers
-from experiments.setups.modes.rivers import SIDE_BY_SIDE_HYSTERESIS, river_time
+from experiments.setups.modes.rivers import SIDE_BY_SIDE_HYSTERESIS, SIDE_BY_SIDE_SIGMA, river_time
 from experiments.setups.parts.budget import fastest
 from experiments.setups.parts.defaults import river_gains
 from experiments.setups.parts.hands import PUSH_START_DISTANCE
@@ -23,15 +23,14 @@ from sim.users.hand.actions import Push
 
 # Admissible speeds over the river's own: a hand from a neighbouring river has that river's speed.
 _SPEED_RANGE = (0.5, 2.0)
-# [s] in which a river brings a hand to its own pace: from walk to run within 0.35 s the figure falls at all of twelve
-# angles, if the pace changes as fast, and at none if it takes a second (`experiments.studies.gait_changes`)
-_EASE_TIME = 1.0
-CROSS_RATE = 3.0
-"""ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.56 s.
+EASE_TIME = 2.0
+"""Time in which a river brings a hand to its own pace [s]: from the embedded walk to the run the figure falls at all of
+six angles, if the pace changes as fast as the hand goes over (`experiments.studies.gait_changes`)."""
+CROSS_RATE = 2.0
+"""ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.84 s.
 
-Of 72 changes between six pairs of captured gaits 28 fall if the figure follows at once, and three with 3/s; with 4/s two
-of six from the embedded walk to the run fall, with 6/s four of six between two captures
-(`experiments.studies.gait_changes`)."""
+Pushed between two pairs of captured gaits, there and back, it has 6.0 to 11.0 % of weight. With 3/s and a pace within 1
+s it falls in one of four runs and has 9 to 22 % in the others, with 2.5/s and 1.5 s 9.5 to 10.9 %."""
 
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 # [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures stay up, on the default
@@ -98,7 +97,7 @@ def lifted_choice(haptic_map: Lifted, mode: Rivers) -> RiverChoice:
 def side_by_side(bundle: RiverBundle, given: tuple[Trajectory, ...]) -> RiverChoice:
     """Rivers that lie side by side; their reference speed is the greatest, so that hands at that speed are taken."""
     pace = max(fastest(river.curve) for river in bundle.rivers)
-    return RiverChoice(bundle, given, pace, SIDE_BY_SIDE_HYSTERESIS * pace, _EASE_TIME)
+    return RiverChoice(bundle, given, pace, SIDE_BY_SIDE_HYSTERESIS * pace, EASE_TIME, SIDE_BY_SIDE_SIGMA * pace)
 
 
 def lifted_river(course: Trajectory, mode: Rivers) -> River:

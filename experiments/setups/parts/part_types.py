@@ -67,6 +67,8 @@ class RiverChoice(NamedTuple):
         Margin in favour of the river that already has the hand [m/s].
     ease : float
         Time in which a river brings a hand that it has taken to its own pace [s].
+    sigma : float
+        σ of the discrete form [m/s]; 0 for that of rivers that cross.
     cross_track : Array
         How the figure follows a hand across rivers (`sim.reference.cross_track`); empty: at once.
     """
@@ -76,6 +78,7 @@ class RiverChoice(NamedTuple):
     pace: float
     hysteresis: float
     ease: float = 0.0
+    sigma: float = 0.0
     cross_track: Array = np.zeros(0)
 
 

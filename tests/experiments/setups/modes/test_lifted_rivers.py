@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 
 from controllers.errors import ParameterError
+from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.haptic_map.lifted import Lifted
+from controllers.state import HandState
 from experiments.config.options import run_config
 from experiments.setups.modes.lifted_runs import default_pushes, lifted_choice, lifted_river, pushed_over
+from experiments.setups.modes.rivers import law_of
 from experiments.setups.parts.defaults import resolved, river_gains
+from geometry.quaternions import unit
 from models.mocap.library import embedded
+from tests.controllers.fields.field_probes import run_over
 
 TURN = 2.0 * np.pi
 MODE = resolved(run_config(map="map.npz", mode="rivers", user="push")).mode
@@ -53,6 +58,20 @@ def test_admissible_speeds_are_half_to_twice_the_river_speed():
         np.testing.assert_allclose(speeds, np.outer(own, [0.5, 2.0]))
         assert river.tau == pytest.approx(0.4)
     assert lifted_river(h_map.curve(0), MODE).drag == 20.0
+
+
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 0)])
+def test_hand_that_crosses_over_fast_is_taken_by_the_other_river_before_it_has_passed_it(first, second):
+    h_map = two_clips()
+    program = law_of(MODE, lifted_choice(h_map, MODE)).program()
+    memory, wrench = program.fresh_memory(), np.empty((1, 6))
+    start, end = (h_map.curve_point(i, 4.0) for i in (first, second))
+    along = np.array([-np.sin(4.0), np.cos(4.0), 0.0])
+    # It goes with both rivers, and across at the speed of the faster one.
+    for share in np.linspace(0.0, 1.0, 21):
+        hand = HandState.at(start + share * (end - start), 0.1 * along + 0.13 * unit(end - start), 0.05 * share)
+        run_over(*program.compiled(), memory, hand.vector()[None], wrench)
+    assert memory[TRACE_RIVER] == second
 
 
 @pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 0)])
