@@ -4,7 +4,7 @@
 `hvf lift` wrote, as fast as rivers do, begun at six angles, and holds it at shares of the way between them. The
 physical figure follows each animation, and a table shows its residual, or when it falls.
 
-A river that takes a hand sets the pace of its own clip at once, or within a second
+A river that takes a hand sets the pace of its own clip at once, or gradually
 (`controllers.fields.higher_order.HigherOrder.ease`), and the figure goes from clip to clip with the hand, or gradually
 (`sim.reference.cross_track`).
 """

@@ -23,7 +23,7 @@ _MIN_ANGLE_APART = 1.2
 # [s] time before and after a transition over which motions are compared. With half of it the transition of walk and run
 # is at 317° instead of 311°, with twice at 338°; the condition number of h_* is up to 77 and 82 instead of 81.
 _WINDOW_TIME = 0.2
-# [m/s] between two gaits in step: a figure that changes over (`sim.reference.cross_track`) accelerates by 2.8 m/s².
+# [m/s] between two gaits in step: a figure that changes over (`sim.reference.cross_track`) accelerates by 1.8 m/s².
 # Between seven pairs of gaits 0.9 to 2.2 m/s apart it stands; from a walk into a sprint, 4.1 m/s apart, it falls.
 _MAX_SPEED_CHANGE = 2.5
 

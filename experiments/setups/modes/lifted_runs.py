@@ -39,7 +39,7 @@ _PUSH_LEAD_TIME = 0.36
 _CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
 # [m]; embedded clips are 12 and 17 mm apart at their transitions; captures are 1.6 m apart at one, where a figure that
-# changes over within a second moves at up to 1.8 m/s, and falls.
+# changes over within a second fell.
 _MAX_CARRY_DISTANCE = 0.25
 
 # A foot that rises by 2 mm in mid-stance still bears load: with the default a runner counted as in flight and fell.
@@ -145,7 +145,7 @@ def carried_over(haptic_map: Lifted, transition: MapTransition) -> tuple[Lifted,
     names = f"{haptic_map.names[transition.first]} and {haptic_map.names[transition.second]}"
     return haptic_map, (
         f"where {names} agree, their positions on the floor are {apart:.1f} m apart: a push over carries the figure "
-        "there within a second, and it may fall; clips that stay in place, or keep going, suit better",
+        "there within two seconds, and it may fall; clips that stay in place, or keep going, suit better",
     )
 
 

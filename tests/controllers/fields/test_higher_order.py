@@ -178,7 +178,7 @@ def test_river_brings_a_hand_to_its_own_pace_within_the_ease_time():
     river = replace(straight_river(0.0), speeds=[[0.6 * SPEED, 2.0 * SPEED]] * 2)
     program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.4).program()
     times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
-    for pace, first in ((0.7, 0.7), (1.3, 1.3), (0.3, 0.6)):
+    for pace, first in ((0.7, 0.7), (1.3, 1.3), (0.3, 0.6), (0.95, 1.0), (1.05, 1.0)):
         # A hand that keeps its pace feels the damper against the current's; it is on the curve, where w = 1.
         hands = [HandState.at(river.curve.point(0.8 + pace * t), [pace * SPEED, 0, 0], t) for t in times]
         forces, _ = _run(program, hands)
