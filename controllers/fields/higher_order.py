@@ -327,8 +327,8 @@ class HigherOrder(Law):
 
     A river may bring a hand of another pace to its own gradually: in the discrete form its current along the curve is
     s φ̇_i, and s goes from the pace of the hand when it was taken, within T_e, to 1. The pace is that of the nearest
-    point, so a hand beside a bend keeps its angular speed, clamped to the admissible speeds over |φ̇_i|; within 10 % of 1
-    it is 1:
+    point, so a hand beside a bend keeps its angular speed, clamped to the admissible speeds over |φ̇_i|, and 1 if it is
+    within 10 % of it:
 
     .. math:: s_0 = \frac{v \cdot \dot\varphi_i}{|\dot\varphi_i|^2 + (\varphi_i - p) \cdot \ddot\varphi_i}
 

@@ -69,8 +69,8 @@ class RiverChoice(NamedTuple):
         Time in which a river brings a hand that it has taken to its own pace [s].
     sigma : float
         σ of the discrete form [m/s]; 0 for that of rivers that cross.
-    cross_track : Array
-        How the figure follows a hand across rivers (`sim.reference.cross_track`); empty: at once.
+    cross_track : Array, optional
+        How the figure follows a hand across rivers (`sim.reference.cross_track`); by default at once.
     """
 
     bundle: RiverBundle
@@ -79,7 +79,7 @@ class RiverChoice(NamedTuple):
     hysteresis: float
     ease: float = 0.0
     sigma: float = 0.0
-    cross_track: Array = np.zeros(0)
+    cross_track: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -285,7 +285,7 @@ class Parts:
     held_seconds : float
         Duration of the clips [s] where a hand may hold the figure in the middle of a flight, else 0; where it is
         slower than they are, their flights are lowered to the floor.
-    cross_track : Array
+    cross_track : Array, optional
         As in `RiverChoice`.
     walking : Walking, optional
         How a figure is led: its walker is the map's argument; without it that is the stylus pose.
@@ -311,7 +311,7 @@ class Parts:
     argument_at: Callable[[Array, Array], Array]
     bends: bool = False
     held_seconds: float = 0.0
-    cross_track: Array = field(default_factory=lambda: np.zeros(0))
+    cross_track: Array | None = None
     walking: Walking | None = None
     handled: tuple[tuple[float, float], ...] = ()
     remarks: tuple[str, ...] = ()
