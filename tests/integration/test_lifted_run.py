@@ -96,7 +96,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     assert distance[-2000:].max() < 1e-3
     assert config.seconds - change.t > 4.0
     assert summary.figure.fell_at is None
-    # 1.9 to 6.5 cm, and residuals of 0.084 to 0.118, in 16 runs: seeds, weights and kernels of OpenBLAS.
+    # Residuals of 0.081 to 0.112 in 23 runs: seeds and kernels of OpenBLAS.
     assert summary.figure.root_error_max_cm < 12.0
     assert summary.figure.residual_in_flight_max == 0.0
     assert summary.figure.residual_force_rms < 0.18
@@ -122,7 +122,7 @@ def test_push_takes_the_figure_from_a_captured_walk_to_a_captured_run_and_back(t
         ("_run", "walk"),
     ]
     assert summary.figure.fell_at is None
-    # 0.119 and 0.120 with two seeds; without the filter across rivers it falls.
+    # 0.107 and 0.109 over 17 s with two seeds; a figure that followed the hand at once fell.
     assert summary.figure.residual_force_rms < 0.2
 
 

@@ -167,8 +167,8 @@ def find_transitions(compared: Comparison, most: float, strides: Sequence[int] =
             means = np.sqrt([np.square(part).mean(axis=1) for part in parts])
             row = np.sqrt(np.square(means).mean(axis=0))
             row[~(compared.inside[:, i] & compared.inside[:, j])] = np.inf
-            least = np.inf if _in_step(compared, strides, i, j) else most
-            minima = (row <= np.roll(row, 1)) & (row < np.roll(row, -1)) & (row <= least) & np.isfinite(row)
+            bound = np.inf if _in_step(compared, strides, i, j) else most
+            minima = (row <= np.roll(row, 1)) & (row < np.roll(row, -1)) & (row <= bound) & np.isfinite(row)
             for k in np.flatnonzero(minima):
                 pose, velocity, support = (float(value) for value in means[:, k])
                 here, there = (float(value) for value in compared.speed[around[k]][:, [i, j]].mean(axis=0))

@@ -29,12 +29,12 @@ six angles, if the pace changes as fast as the hand goes over (`experiments.stud
 CROSS_RATE = 2.0
 """ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.84 s.
 
-Pushed between two pairs of captured gaits, there and back, it has 6.0 to 11.0 % of weight. With 3/s and a pace within 1
+Pushed between two pairs of captured gaits, there and back, it has 7.0 to 11.2 % of weight. With 3/s and a pace within 1
 s it falls in one of four runs and has 9 to 22 % in the others, with 2.5/s and 1.5 s 9.5 to 10.9 %."""
 
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
-# [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures stay up, on the default
-# layout and its mirror image
+# [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures that followed the hand
+# at once stayed up, on the default layout and its mirror image
 _PUSH_LEAD_TIME = 0.36
 _CROSSING_RATE = 3.6  # [1/s] push force over (drag × distance of the curves) with which a hand just reaches the other
 _STAY_LAPS = 3  # laps on the other curve
