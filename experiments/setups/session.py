@@ -141,7 +141,7 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
 
     It is called with rows in the order of time, `stride` figure updates apart.
     """
-    if session.parts.maps.plays_rivers:
+    if session.parts.maps.plays_rivers or session.parts.cross_track is not None:
         return _river_animation(session, stride)
     haptic_map = session.haptic_map
     memory = haptic_map.compiled().memory
@@ -155,10 +155,12 @@ def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, 
 
 
 def _river_animation(session: Session, stride: int) -> Callable[[Array, Array, Array], Array]:
-    """The same where each river plays its own clip, with the transitions between clips that the figure made."""
+    """The same where rivers play clips of their own, with the changes from clip to clip as the figure made them."""
     period = stride * session.servo.figure_ticks * session.servo.plant.period
     compiled, part, figure = session.haptic_map.compiled(), session.config.figure, session.world.body
-    reference = make_reference(figure, compiled, period, part.smoothing, part.blend, packed_legs(figure))
+    reference = make_reference(
+        figure, compiled, period, part.smoothing, part.blend, packed_legs(figure), cross_track=session.parts.cross_track
+    )
 
     def poses_at(nearest: Array, phases: Array, rivers: Array) -> Array:
         traces = np.zeros((len(nearest), TRACE_SIZE))
