@@ -1,7 +1,13 @@
 r"""Closing of a motion: as a lap, by a cross-fade at the seam, or with a way back to its first pose.
 
-A cross-fade with the frames around a lap's ends makes poses and velocities agree at the seam. A closed motion with a
-foot that always stands returns exactly to its place: otherwise the foot would skate by the difference in every lap.
+Motion a ends at a lap's seam and, moved back to the lap's start, is d away from the motion b that starts there. Both
+share d, by a quintic S from 0 at −T to 1 at T:
+
+.. math:: a(t) \oplus S(t)\,d(t) \;\; (t \le 0), \qquad b(t) \oplus (S(t) - 1)\,d(t) \;\; (t \ge 0)
+
+Where the capture goes on beyond both ends this is a cross-fade, and velocities agree at the seam too; where it does
+not, as in a file that is one lap, d stays as it is. A closed motion with a foot that always stands returns exactly to
+its place: otherwise the foot would skate by the difference in every lap.
 """
 
 import numpy as np
@@ -13,7 +19,7 @@ from models.mocap.preparation.coming_to_rest import departing
 from models.mocap.preparation.poses import add_tangents, smoothed
 from models.mocap.preparation.stances import stances
 
-# Half width of the cross-fade at the ends [s]: half or twice changes joints of 19 captures by 0.3 or 0.1° RMS.
+# T [s]: half or twice changes joints of 19 captures by 0.3 or 0.1° RMS.
 _FADE_TIME = 0.25
 # Duration of a way back [s], and the addition for each radian of the largest joint rotation [s/rad].
 _WAY_BACK_TIMES = (0.6, 1.0)
@@ -23,30 +29,24 @@ _IN_PLACE_DISTANCE, _IN_PLACE_ANGLE = 0.10, np.deg2rad(15.0)
 
 
 def closed_lap(clip: Clip, first: int, last: int, half: bool = False) -> Clip:
-    """The frames from first to last as a closed lap, cross-faded with the frames before the first and after the last.
+    """The frames from first to last as a closed lap.
 
     With `half`, the part ends like the mirror image of its start, and is continued by its own mirror image.
     """
     image = mirrored if half else _identity
     opening, n = image(clip).poses, last - first
-    poses = clip.poses
-    displacement = Clip(np.vstack((opening[first], poses[last])), clip.fps, clip.name).displacement
+    lap = clip.poses[first : last + 1].copy()
+    displacement = Clip(np.vstack((opening[first], lap[-1])), clip.fps, clip.name).displacement
     inverse = displacement.inverse()
-    width = int(min(_FADE_TIME * clip.fps, n // 3))
-    before, after = min(width, first), min(width, clip.n_frames - 1 - last)
-    lap = poses[first : last + 1].copy()
-    if before + after >= 6:
-        for k in range(-before, after + 1):
-            # 0 is the motion at the lap's end, 1 that at its start (or its mirror image), both at the same place.
-            fade = smooth_steps(np.array((k + before) / (before + after)))
-            end = inverse.moved(poses[last + k])
-            mixed = add_tangents(end[None], fade * pose_difference(end, opening[first + k])[None])
-            if k >= 0:
-                lap[k] = image(Clip(mixed, clip.fps, clip.name)).poses[0]
-            if k <= 0:
-                lap[n + k] = displacement.moved(mixed[0])
-    rest = pose_difference(displacement.moved(image(Clip(lap[:1], clip.fps, clip.name)).poses[0]), lap[-1])
-    lap = add_tangents(lap, -np.linspace(0.0, 1.0, n + 1)[:, None] * rest)
+    width = max(1, int(min(_FADE_TIME * clip.fps, n // 3)))
+    frames = np.arange(-width, width + 1)
+    captured = np.clip(frames, -first, clip.n_frames - 1 - last)
+    apart = pose_difference(inverse.moved(clip.poses[last + captured]), opening[first + captured])
+    share = smooth_steps(0.5 + 0.5 * frames / width)[:, None]
+    starts = add_tangents(opening[first : first + width + 1], ((share - 1.0) * apart)[width:])
+    ends = add_tangents(inverse.moved(lap[n - width :]), (share * apart)[: width + 1])
+    lap[: width + 1] = image(Clip(starts, clip.fps, clip.name)).poses
+    lap[n - width :] = displacement.moved(ends)
     if half:
         other = image(Clip(lap, clip.fps, clip.name))
         join = Clip(np.vstack((other.poses[0], lap[-1])), clip.fps, clip.name).displacement

@@ -130,6 +130,20 @@ def test_looped_closes_a_lap_written_with_few_digits(walks):
     assert np.abs(pose_difference(found.clip.poses, written.poses)).max() < 2e-4
 
 
+def test_lap_without_frames_around_it_shares_the_jump_between_its_ends(walks):
+    """As in files of one lap: spread over the lap, a jump of 28° at a shoulder turned it by 17° RMS."""
+    walk, _ = walks
+    drift = np.zeros((walk.n_frames, 57))
+    drift[:, 6 + 3 * JOINTS.index("right_shoulder")] = np.linspace(0.0, 0.5, walk.n_frames)
+    drifting = Clip(add_tangents(walk.poses, drift), walk.fps, "drift")
+    found = close_or_rest(drifting, f"0:{drifting.duration}").clip
+    changed = np.linalg.norm(pose_difference(drifting.poses, found.poses), axis=1)
+    assert found.closes()
+    assert np.abs(changed[[0, -1]] - 0.25).max() < 1e-6
+    assert changed.max() < 0.26
+    assert changed[round(0.3 * walk.fps) : -round(0.3 * walk.fps)].max() < 1e-6
+
+
 def test_looped_removes_the_drift_of_a_lap_on_standing_feet():
     """A cheer away from the origin whose capture turns by 4° and drifts by 2 cm per lap."""
     cheer = resampled(embedded("cheer"), 120.0)
