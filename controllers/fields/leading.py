@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 
 from controllers.checks import check_field_types, checked
+from controllers.fields.algebra.feed import Feed
 from controllers.fields.algebra.instructions import TRACE_SIZE, write_trace_point
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.walker_feed import WalkerFeed
 from controllers.state import HAND_POSITION, HAND_TIME, HAND_VELOCITY
 from controllers.walking.walking import FOLLOWED, Walking, followed_at
 from geometry.arrays import Array
@@ -126,5 +126,5 @@ class Leading(Law):
     def _compose(self) -> Program:
         gains = LeadingGains(self.k_l, self.b, self.k_z, self.walking.scale, *self.walking.lead)
         numbers = np.concatenate([gains, self.walking.packed()])
-        feed = WalkerFeed(TRACE_SIZE, len(gains), self.walking)
+        feed = Feed(self.walking, TRACE_SIZE, len(gains))
         return Program.of(self, leading_wrench, numbers, np.zeros(FOLLOWED), feeds=(feed,))

@@ -21,8 +21,9 @@ from numba import njit
 
 from controllers.checks import checked
 from controllers.errors import ParameterError
+from controllers.fields.algebra.feed import Feed
 from controllers.fields.algebra.instructions import TRACE_SIZE
-from controllers.fields.algebra.law import Law, MapFeed, Program
+from controllers.fields.algebra.law import Law, Program
 from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap
 from controllers.state import HAND_ANGULAR_VELOCITY, HAND_VELOCITY
 from controllers.work_array import work_array
@@ -198,7 +199,7 @@ class SoftWall(Law):
         for joint, column, row, limit in zip(table, self.columns, self.rows, self.limits, strict=True):
             joint[:_LIMITS] = column, row, len(limit) == 3
             joint[_LIMITS : _LIMITS + limit.size] = np.ravel(limit)
-        feed = MapFeed(TRACE_SIZE, _GAINS_SIZE + table.size, haptic_map)
+        feed = Feed(haptic_map, TRACE_SIZE, _GAINS_SIZE + table.size)
         map_output = np.zeros(haptic_map.nq + haptic_map.nv * STYLUS_TANGENT)
         numbers = np.concatenate([gains, table.ravel(), params])
         return Program.of(self, soft_wall_wrench, numbers, np.concatenate([map_output, memory]), feeds=(feed,))

@@ -106,7 +106,7 @@ def walls_microseconds(session: Session) -> float:
     times = np.linspace(0.0, curve.duration, 4000)
     hands = np.array([HandState.at(curve.point(t), curve.velocity(t), t).vector() for t in times])
     program, wrench = figure_walls(session.haptic_map, JointWalls()).program(), np.empty(6)
-    memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.map_feeds)
+    memory, field, maps = program.fresh_memory(), program.compiled(), unlinked_maps(program.feeds)
     maps = maps._replace(stages=linked_stages(maps.stages))
     _evaluate_walls(maps, field, memory, hands[:2], wrench)
     return _microseconds(lambda: _evaluate_walls(maps, field, memory, hands, wrench), len(hands))

@@ -16,7 +16,7 @@ from controllers.fields.algebra.program import evaluate
 from controllers.fields.algebra.walker_feed import Walkers
 from controllers.haptic_map.map_stages import MAP_ARGUMENTS, kernels_of, linked
 from controllers.kernel_call import add_kernel_listener, address_of
-from controllers.walking.walking import follow_hand
+from controllers.walking.walking import Walking, follow_hand
 from geometry.arrays import IntArray
 from sim.compilation.compiled import keep_on_disk
 from sim.compilation.units import Unit
@@ -58,7 +58,7 @@ def units_of_map(stages: IntArray) -> tuple[Unit, ...]:
 
 def units_of_laws(program: Program) -> tuple[Unit, ...]:
     """Compilation units of the laws of a field and of its walkers, except those of user-defined functions."""
-    walker = (follow_hand,) if program.walker_feeds else ()
+    walker = (follow_hand,) if any(isinstance(feed.source, Walking) for feed in program.feeds) else ()
     return tuple(Unit.of(kernel, *LAW_ARGUMENTS) for kernel in (*program.kernels, *walker) if is_cacheable(kernel))
 
 

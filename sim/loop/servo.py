@@ -84,9 +84,9 @@ def unlinked_field(program: Program, limiter: ForceLimiter, tank: EnergyTank) ->
 
 def _program_parts(program: Program) -> tuple[IntArray, IntArray, Array, Array, IntArray, Maps, Walkers]:
     """The first seven attributes of a `Field`, those that depend on the program."""
-    slots, no_units = [feed.slot for feed in program.python_feeds], np.zeros(0, dtype=np.int64)
-    memory, maps = program.fresh_memory(), unlinked_maps(program.map_feeds)
-    walkers = fresh_walkers(program.walker_feeds)
+    slots, no_units = [slot for _, slot in program.python_feeds], np.zeros(0, dtype=np.int64)
+    memory, maps = program.fresh_memory(), unlinked_maps(program.feeds)
+    walkers = fresh_walkers(program.feeds)
     return no_units, program.ops, program.params, memory, np.array(slots, dtype=np.int64), maps, walkers
 
 

@@ -12,6 +12,7 @@ from controllers.checks import check_kind, checked
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.description import parts_of
+from controllers.fields.algebra.feed import Feed
 from controllers.fields.algebra.instructions import (
     LAW_ARGUMENTS,
     OP_CODE,
@@ -24,12 +25,12 @@ from controllers.fields.algebra.instructions import (
     empty_trace,
 )
 from controllers.fields.algebra.program import Compiled, evaluate
-from controllers.fields.algebra.walker_feed import WalkerFeed, Walkers, feed_walkers, fresh_walkers
+from controllers.fields.algebra.walker_feed import Walkers, feed_walkers, fresh_walkers
 from controllers.fields.algebra.weights import WEIGHT_SIZE, Weight
 from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.kernel_call import address_of
 from controllers.state import HAND_POSITION, HAND_SIZE, HandState, Wrench
-from controllers.walking.walking import follow_hand
+from controllers.walking.walking import Walking, follow_hand
 from geometry.arrays import Array, IntArray
 
 
@@ -129,46 +130,6 @@ class Law(ABC):
         return self.program().followed(Join.LIMIT, [checked(*bound, infinite=True) for bound in bounds])
 
 
-class PythonFeed(NamedTuple):
-    """Wrench [F (3), τ (3)] in a field's memory that a Python function writes before each evaluation.
-
-    Attributes
-    ----------
-    slot : int
-        Offset in the memory.
-    function : callable
-        From the measured hand state to the six numbers.
-    """
-
-    slot: int
-    function: Callable[[HandState], Array]
-
-    def moved(self, params: int, memory: int) -> "PythonFeed":
-        """The same feed with its offsets in the parameters and in the memory increased."""
-        return self._replace(slot=self.slot + memory)
-
-
-class MapFeed(NamedTuple):
-    """Pose h (nq) and derivative h_* (nv × 6) of a haptic map at the stylus, written into a law's memory.
-
-    Attributes
-    ----------
-    slot : int
-        Offset of h in the memory; h_* and then the map's own memory follow.
-    at : int
-        Offset of the map's parameters among the field's.
-    haptic_map : HapticMap
-    """
-
-    slot: int
-    at: int
-    haptic_map: HapticMap
-
-    def moved(self, params: int, memory: int) -> "MapFeed":
-        """The same feed with its offsets in the parameters and in the memory increased."""
-        return self._replace(slot=self.slot + memory, at=self.at + params)
-
-
 class LawOffsets(NamedTuple):
     """Offsets of the numbers of a law in a program.
 
@@ -200,7 +161,7 @@ class Program(Law):
         Compiled laws, each once; the code of a law's instruction is its kernel's index here.
     laws : tuple of Law
         Laws in the order of their instructions.
-    python_feeds, map_feeds, walker_feeds
+    feeds : tuple of Feed
         Inputs that are written into the memory before each evaluation, besides the hand.
 
     Raises
@@ -214,9 +175,7 @@ class Program(Law):
     memory: Array
     kernels: tuple[Kernel, ...] = ()
     laws: tuple[Law, ...] = ()
-    python_feeds: tuple[PythonFeed, ...] = ()
-    map_feeds: tuple[MapFeed, ...] = ()
-    walker_feeds: tuple[WalkerFeed, ...] = ()
+    feeds: tuple[Feed, ...] = ()
 
     def __post_init__(self) -> None:
         codes, depth = self.ops[:, OP_CODE].tolist(), self._depths
@@ -258,7 +217,7 @@ class Program(Law):
         params: Sequence[float] | Array,
         memory: Sequence[float] | Array,
         curve: Trajectory | None = None,
-        feeds: tuple["PythonFeed | MapFeed | WalkerFeed", ...] = (),
+        feeds: tuple[Feed, ...] = (),
     ) -> "Program":
         """Program of one law: its kernel, parameters, initial memory, curve, and the feeds written before each tick.
 
@@ -267,10 +226,7 @@ class Program(Law):
         blob = np.zeros(0) if curve is None else curve.packed()
         ops = np.array([[0, 0, TRACE_SIZE, len(params)]], dtype=np.int64)
         numbers = np.concatenate([np.asarray(params, dtype=np.float64), blob])
-        python = tuple(feed for feed in feeds if isinstance(feed, PythonFeed))
-        maps = tuple(feed for feed in feeds if isinstance(feed, MapFeed))
-        walkers = tuple(feed for feed in feeds if isinstance(feed, WalkerFeed))
-        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), python, maps, walkers)
+        return Program(ops, numbers, np.concatenate([empty_trace(), memory]), (kernel,), (law,), feeds)
 
     def joined(self, other: "Program", join: Join, params: Sequence[float] = ()) -> "Program":
         """Both programs one after the other, then an operation that combines their two wrenches into one."""
@@ -285,9 +241,7 @@ class Program(Law):
             np.concatenate([self.memory, other.memory[TRACE_SIZE:]]),
             kernels,
             self.laws + other.laws,
-            self.python_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.python_feeds),
-            self.map_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.map_feeds),
-            self.walker_feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.walker_feeds),
+            self.feeds + tuple(feed.moved(params_shift, memory_shift) for feed in other.feeds),
         )
 
     def followed(self, join: Join, params: Sequence[float]) -> "Program":
@@ -308,9 +262,14 @@ class Program(Law):
         return self._compiled
 
     @property
+    def python_feeds(self) -> tuple[tuple[Callable[[HandState], Array], int], ...]:
+        """Functions that the loop calls at every tick, and the offset in the memory of the six numbers of each."""
+        return tuple((source, slot) for source, slot, _ in self.feeds if not isinstance(source, HapticMap | Walking))
+
+    @property
     def python_laws(self) -> tuple[Callable[[HandState], Array], ...]:
-        """Functions that the loop calls at every tick, each returning a wrench of six numbers."""
-        return tuple(feed.function for feed in self.python_feeds)
+        """The functions of `python_feeds`."""
+        return tuple(function for function, _ in self.python_feeds)
 
     def fresh_memory(self) -> Array:
         """Memory for a new run."""
@@ -318,21 +277,23 @@ class Program(Law):
 
     def fresh_walkers(self) -> Walkers:
         """Walkers for a new run; their kernel is compiled in this process if it is not compiled yet."""
-        walkers = fresh_walkers(self.walker_feeds)
-        return walkers.linked(address_of(follow_hand, LAW_ARGUMENTS)) if self.walker_feeds else walkers
+        walkers = fresh_walkers(self.feeds)
+        return walkers.linked(address_of(follow_hand, LAW_ARGUMENTS)) if walkers.feeds.size else walkers
 
     def feed(self, memory: Array, hand: HandState) -> None:
         """Write the inputs of the feeds into the memory, from Python, as at the first tick of a run."""
-        if self.walker_feeds:
-            feed_walkers(self.fresh_walkers(), self.params, memory, hand.vector())
-        for slot, function in self.python_feeds:
+        walkers = self.fresh_walkers()
+        if walkers.feeds.size:
+            feed_walkers(walkers, self.params, memory, hand.vector())
+        for function, slot in self.python_feeds:
             memory[slot : slot + 6] = function(HandState.of(hand.vector()))
         stylus = hand.vector()[HAND_POSITION : HAND_POSITION + STYLUS]
-        for slot, _, haptic_map in self.map_feeds:
-            first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT
-            map_memory = memory[last : last + len(haptic_map.compiled().memory)]
-            memory[slot:first] = haptic_map.pose(stylus, map_memory)
-            memory[first:last] = haptic_map.jacobian(stylus, map_memory).ravel()
+        for haptic_map, slot, _ in self.feeds:
+            if isinstance(haptic_map, HapticMap):
+                first, last = slot + haptic_map.nq, slot + haptic_map.nq + haptic_map.nv * STYLUS_TANGENT
+                map_memory = memory[last : last + len(haptic_map.compiled().memory)]
+                memory[slot:first] = haptic_map.pose(stylus, map_memory)
+                memory[first:last] = haptic_map.jacobian(stylus, map_memory).ravel()
 
     def places(self) -> tuple[LawOffsets, ...]:
         """Offsets of the laws' parameters and memory, in the order of their instructions."""

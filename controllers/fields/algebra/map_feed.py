@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from controllers.fields.algebra.law import MapFeed
-from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT
+from controllers.fields.algebra.feed import Feed
+from controllers.haptic_map.base import STYLUS, STYLUS_TANGENT, HapticMap
 from controllers.haptic_map.map_stages import evaluate_map_jacobian
 from controllers.state import HAND_POSITION
 from geometry.arrays import Array, IntArray
@@ -42,13 +42,14 @@ class Maps(NamedTuple):
     stages: IntArray
 
 
-def unlinked_maps(feeds: tuple[MapFeed, ...]) -> Maps:
-    """The maps of a field's `map_feeds`, without the addresses of their kernels."""
-    rows, stages = np.zeros((len(feeds), len(_Column)), dtype=np.int64), np.zeros((0, 3), dtype=np.int64)
-    for row, (slot, at, haptic_map) in zip(rows, feeds, strict=True):
-        first, stages = len(stages), np.concatenate([stages, haptic_map.compiled().stages])
-        row[:] = slot, at, first, len(stages), haptic_map.nq, haptic_map.nv
-    return Maps(rows, stages)
+def unlinked_maps(feeds: tuple[Feed, ...]) -> Maps:
+    """The maps among a field's feeds, without the addresses of their kernels."""
+    rows, stages = list[list[int]](), np.zeros((0, 3), dtype=np.int64)
+    for source, slot, at in feeds:
+        if isinstance(source, HapticMap):
+            first, stages = len(stages), np.concatenate([stages, source.compiled().stages])
+            rows.append([slot, at, first, len(stages), source.nq, source.nv])
+    return Maps(np.array(rows, dtype=np.int64).reshape(-1, len(_Column)), stages)
 
 
 @njit

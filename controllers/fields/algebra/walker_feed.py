@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from controllers.fields.algebra.feed import Feed
 from controllers.fields.algebra.instructions import LAW_ARGUMENTS
 from controllers.kernel_call import kernel_call
 from controllers.walking.walking import Walking
@@ -25,27 +26,6 @@ class _Column(IntEnum):
     SLOT = 1
     AT = 2
     PLACE = 3
-
-
-class WalkerFeed(NamedTuple):
-    """The part of a walker's state that a law reads, written into its memory.
-
-    Attributes
-    ----------
-    slot : int
-        Offset of a `Followed` in the memory.
-    at : int
-        Offset of the walking's parameters among the field's.
-    walking : Walking
-    """
-
-    slot: int
-    at: int
-    walking: Walking
-
-    def moved(self, params: int, memory: int) -> "WalkerFeed":
-        """The same feed with its offsets in the parameters and in the memory increased."""
-        return self._replace(slot=self.slot + memory, at=self.at + params)
 
 
 class Walkers(NamedTuple):
@@ -69,16 +49,17 @@ class Walkers(NamedTuple):
         return self._replace(feeds=feeds)
 
 
-def fresh_walkers(feeds: tuple[WalkerFeed, ...]) -> Walkers:
-    """Walkers for a new run, one for each `Walking` of the feeds; not linked."""
-    states: list[Array] = []
-    offsets: dict[int, int] = {}
-    for feed in feeds:
-        if id(feed.walking) not in offsets:
-            offsets[id(feed.walking)] = sum(map(len, states))
-            states.append(feed.walking.fresh())
-    rows = np.array([[0, slot, at, offsets[id(walking)]] for slot, at, walking in feeds], dtype=np.int64)
-    return Walkers(rows.reshape(-1, len(_Column)), np.concatenate([np.zeros(0), *states]))
+def fresh_walkers(feeds: tuple[Feed, ...]) -> Walkers:
+    """Walkers for a new run, one for each `Walking` among a field's feeds; not linked."""
+    states, offsets, rows = list[Array](), dict[int, int](), list[list[int]]()
+    for source, slot, at in feeds:
+        if isinstance(source, Walking):
+            if id(source) not in offsets:
+                offsets[id(source)] = sum(map(len, states))
+                states.append(source.fresh())
+            rows.append([0, slot, at, offsets[id(source)]])
+    table = np.array(rows, dtype=np.int64).reshape(-1, len(_Column))
+    return Walkers(table, np.concatenate([np.zeros(0), *states]))
 
 
 @njit

@@ -10,8 +10,9 @@ from numba import njit
 
 from controllers.checks import check_kind
 from controllers.errors import ParameterError
+from controllers.fields.algebra.feed import Feed
 from controllers.fields.algebra.instructions import TRACE_SIZE
-from controllers.fields.algebra.law import Law, Program, PythonFeed
+from controllers.fields.algebra.law import Law, Program
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.function_law import FunctionLaw, place_of
 from geometry.arrays import Array
@@ -35,8 +36,7 @@ class PythonLaw(FunctionLaw):
     """
 
     def _compose(self) -> Program:
-        feed = PythonFeed(TRACE_SIZE, self.six_numbers)
-        return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(feed,))
+        return Program.of(self, given_wrench, [], [0.0] * 6, feeds=(Feed(self.six_numbers, TRACE_SIZE),))
 
 
 @overload

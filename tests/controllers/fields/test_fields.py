@@ -11,10 +11,10 @@ from controllers.errors import ParameterError
 from controllers.fields.algebra.instructions import TRACE_ATTRACTOR, TRACE_DISTANCE, TRACE_PHASE, TRACE_POINT, TRACE_ROW
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
+from controllers.fields.algebra.weights import window
 from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.own.own_law import PythonLaw
-from controllers.fields.river import window
 from controllers.state import HandState
 from tests.derivatives import central_differences
 
@@ -143,17 +143,6 @@ def test_non_finite_hand_gives_non_finite_force():
     assert np.isfinite(_run(program, HandState.at([0.05, 0, 0]), memory)).all()
 
 
-def test_bunny_with_infinite_width_along_the_curve_equals_follow():
-    rng = np.random.default_rng(2)
-    bunny = Bunny(CIRCLE, 200.0, 4.0, np.inf, "along", "clock")
-    follow = Follow(CIRCLE, 200.0, 4.0, epsilon=np.inf)
-    narrow = Bunny(CIRCLE, 200.0, 4.0, 1e4, "along", "clock")
-    for _ in range(20):
-        hand = HandState.at(rng.normal(size=3) * 0.05, rng.normal(size=3) * 0.1, rng.uniform(0, 9))
-        np.testing.assert_array_equal(bunny.wrench(hand).force, follow.wrench(hand).force)
-        np.testing.assert_allclose(narrow.wrench(hand).force, follow.wrench(hand).force, rtol=1e-8, atol=1e-12)
-
-
 def test_bunny_is_a_spring_and_damper_weighted_by_a_gaussian():
     bunny = Bunny(CIRCLE, 200.0, 4.0, 0.02, "point", "clock")
     p, v, t = np.array([0.03, 0.03, 0.01]), np.array([0.1, -0.2, 0.0]), 4.0 + 0.7
@@ -196,7 +185,8 @@ def test_programs_add_and_external_wrench_enters_the_sum():
     external = PythonLaw(lambda hand: hand.p).program()
     program = laws[0].program() + (external + laws[1].program()) + laws[2].program()
     memory = program.fresh_memory()
-    memory[program.python_feeds[0].slot : program.python_feeds[0].slot + 6] = [1, 2, 3, 4, 5, 6]
+    ((_, slot),) = program.python_feeds
+    memory[slot : slot + 6] = [1, 2, 3, 4, 5, 6]
     wrench = _run(program, hand, memory)
     force = sum(law.wrench(hand).force for law in laws)
     np.testing.assert_allclose(wrench, np.concatenate([force + np.array([1, 2, 3]), [4, 5, 6]]), rtol=1e-14)

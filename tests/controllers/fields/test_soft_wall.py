@@ -167,7 +167,7 @@ def test_force_is_finite_far_away_and_on_the_axis():
 def test_compiled_sum_with_another_field_is_exact():
     program = WALL.program() + BRAKE.program()
     memory, wrench = program.fresh_memory(), np.empty(6)
-    maps = unlinked_maps(program.map_feeds)
+    maps = unlinked_maps(program.feeds)
     maps = maps._replace(stages=linked_stages(maps.stages))
     for angle in np.linspace(0.0, 6.0, 30):
         hand = HandState.at(position(0.065, angle, 0.02), (0.2, -0.1, 0.05))
