@@ -209,3 +209,17 @@ class Wrapped(HapticMap):
     def compiled(self) -> CompiledMap:
         """The other map with one more stage, and the memory of a new run."""
         return self.base.compiled().followed_by(self.map_kernel, self._params)
+
+    def pose(self, x: Array, memory: Array | None = None) -> Pose:
+        """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the other map."""
+        return self._changed(x, self.base.pose(x, memory), np.empty((0, STYLUS_TANGENT)))[0]
+
+    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
+        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in the other map."""
+        pose = self.base.pose(x, None if memory is None else memory.copy())
+        return self._changed(x, pose, self.base.jacobian(x, memory))[1]
+
+    def _changed(self, x: Array, pose: Pose, jacobian: Array) -> tuple[Pose, Array]:
+        """Pose and derivative of the other map after the kernel, which takes no memory of its own."""
+        self.map_kernel(self._params, np.asarray(x, dtype=np.float64), np.zeros(0), pose, jacobian)
+        return pose, jacobian

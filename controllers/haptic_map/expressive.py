@@ -8,9 +8,8 @@ from numba import njit
 
 from controllers.curves.cylinder import blend_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap, Wrapped
+from controllers.haptic_map.base import HapticMap, Wrapped
 from controllers.haptic_map.map_stages import kernels_of
-from controllers.state import Pose
 from controllers.work_array import work_array
 from geometry.arrays import Array
 from geometry.rotations import angular_velocity, exponential, logarithm, multiply, rotate, rotation_vector_rate
@@ -18,7 +17,6 @@ from geometry.rotations import angular_velocity, exponential, logarithm, multipl
 FADE_FROM = 2.0 * np.pi / 3.0  # [rad] stylus angle from which its effect fades out, to zero at half a turn
 _JOINTS, _ROWS = 0, 1
 _JOINT, _GAIN, _LOW, _HIGH, _ROW_SIZE = 0, 1, 4, 7, 10
-_NO_MEMORY = np.zeros(0)
 _ROUNDING = 0.02  # [rad] smoothing of the distance to a joint limit near zero, so that it stays positive
 
 
@@ -177,18 +175,6 @@ class Expressive(Wrapped):
             raise ParameterError("expression needs at least one joint that turns with the stylus")
         rows = [_checked_row(joint, last) for joint in joints]
         super().__init__(base, np.concatenate([[len(rows)], *rows]))
-
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h(x), shape (nq,), of a stylus pose (7,); memory as in the base map."""
-        pose = self.base.pose(x, memory)
-        express(self._params, np.asarray(x, dtype=np.float64), _NO_MEMORY, pose, np.empty((0, STYLUS_TANGENT)))
-        return pose
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative h_*(x), shape (nv, 6): columns linear, then angular velocity in H; memory as in the base map."""
-        pose, jacobian = self.base.pose(x, None if memory is None else memory.copy()), self.base.jacobian(x, memory)
-        express(self._params, np.asarray(x, dtype=np.float64), _NO_MEMORY, pose, jacobian)
-        return jacobian
 
 
 def _checked_row(joint: ExpressiveJoint, last: int) -> Array:

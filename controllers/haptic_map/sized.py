@@ -7,7 +7,6 @@ from controllers.checks import check_kind
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import HapticMap, Wrapped
 from controllers.haptic_map.map_stages import CompiledMap
-from controllers.state import Pose
 from geometry.arrays import Array
 
 _SIZE = 0
@@ -66,15 +65,3 @@ class Sized(Wrapped):
     def compiled(self) -> CompiledMap:
         """The other map with one more stage, the memory of a new run, and the size."""
         return super().compiled()._replace(size=self.size)
-
-    def pose(self, x: Array, memory: Array | None = None) -> Pose:
-        """Configuration h_s(x), shape (nq,), of a stylus pose (7,); memory as in the wrapped map."""
-        pose = self.base.pose(x, memory)
-        pose[:3] *= self.size
-        return pose
-
-    def jacobian(self, x: Array, memory: Array | None = None) -> Array:
-        """Derivative, shape (nv, 6): columns linear, then angular velocity in H; memory as in the wrapped map."""
-        jacobian = self.base.jacobian(x, memory)
-        jacobian[:3] *= self.size
-        return jacobian
