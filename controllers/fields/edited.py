@@ -17,7 +17,7 @@ from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.weights import window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
-from controllers.fields.river import River, river_flow
+from controllers.fields.river import River
 from controllers.state import HAND_POSITION, HAND_TIME, MAX_TIME_STEP
 from controllers.work_array import work_array
 from geometry.arrays import Array
@@ -76,21 +76,6 @@ def recorded_wrench(params: Array, at: int, curve: int, memory: Array, slot: int
         share = gains.weight * _performance_window(params, performed, s, inverse_square, p)
         for i in range(3):
             wrench[i] *= -share
-
-
-@njit
-def _recorded_flow(
-    river: Array, inverse_tau: float, inverse_edge: float, performed: Array, inverse_square: float, t: float, p: Array
-) -> Array:
-    """U(t, p) = w(|p − φ'|/ε) (φ̇' − V(φ')) [m/s]; both curves are packed."""
-    flow, point = np.zeros(3), np.empty(3)
-    if performed[START] <= t <= performed[END]:
-        point[0], point[1], point[2] = curve_point(performed, 0, t)
-        river_flow(river, inverse_tau, inverse_edge, point, np.nan, flow)
-        share, velocity = _performance_window(performed, 0, t, inverse_square, p), curve_velocity(performed, 0, t)
-        for i in range(3):
-            flow[i] = share * (velocity[i] - flow[i])
-    return flow
 
 
 def performance(times: npt.ArrayLike, points: npt.ArrayLike) -> Trajectory:
@@ -179,8 +164,8 @@ class Edited(Law):
         checked("epsilon", self.epsilon, "m", least=1e-4)
 
     @cached_property
-    def _packed_curves(self) -> tuple[Array, ...]:
-        return tuple(curve.packed() for curve in (self.river.curve, *self.performed))
+    def _packed_performances(self) -> tuple[Array, ...]:
+        return tuple(curve.packed() for curve in self.performed)
 
     def _compose(self) -> Program:
         """With pace "wait", s starts at φ's start in each run."""
@@ -192,12 +177,12 @@ class Edited(Law):
 
     def flow(self, t: float, p: Array) -> Array:
         """V + Σ α U at time t of the performance [m/s], shape (3,)."""
-        total, river = self.river.flow(t, p), self.river
-        for weight, blob in zip(self.weights, self._packed_curves[1:], strict=True):
-            part = _recorded_flow(
-                self._packed_curves[0], 1.0 / river.tau, river.epsilon**-2, blob, self.epsilon**-2, t, p
-            )  # fmt: skip
-            total = total + weight * part
+        total = self.river.flow(t, p)
+        for weight, curve in zip(self.weights, self._packed_performances, strict=True):
+            if curve[START] <= t <= curve[END]:
+                share = weight * _performance_window(curve, 0, t, self.epsilon**-2, p)
+                current = self.river.flow(t, np.array(curve_point(curve, 0, t)))
+                total += share * (curve_velocity(curve, 0, t) - current)
         return total
 
     def arrays(self) -> dict[str, Array]:

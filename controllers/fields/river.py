@@ -3,38 +3,21 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from controllers.checks import check_field_types, checked
-from controllers.curves.closest_point import closest_phase
-from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ControllerError
 from controllers.fields.admissible import checked_speeds
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.algebra.weights import window
-from controllers.fields.follow import Follow
+from controllers.fields.follow import Follow, FollowGains, follow_at
 from geometry.arrays import Array
-
-__all__ = ["Course", "River", "integrate", "window"]
 
 Flow = Callable[[float, Array], Array]
 """A flow V(t, p): time [s] and p_H [m], shape (3,), to a velocity [m/s], shape (3,)."""
 _MAX_STEP = 0.02  # of an integration [s]; a much longer step could miss a narrow river
-
-
-@njit
-def river_flow(curve: Array, inverse_tau: float, inverse_square: float, p: Array, guess: float, flow: Array) -> float:
-    """Write V(p) = w(d/ε) (φ̇(t*) + (φ(t*) − p)/τ) [m/s] to `flow` and return t*; `curve` is a packed curve."""
-    phase, distance = closest_phase(curve, 0, p[0], p[1], p[2], guess)
-    p_curve, v_curve = curve_point(curve, 0, phase), curve_velocity(curve, 0, phase)
-    w = window(distance * distance * inverse_square)
-    for i in range(3):
-        flow[i] = w * (v_curve[i] + inverse_tau * (p_curve[i] - p[i]))
-    return phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,29 +78,15 @@ class River(Law):
         return self.force.program()
 
     def flow(self, t: float, p: Array) -> Array:
-        """V(p) [m/s], shape (3,); it does not depend on the time t."""
-        flow = np.empty(3)
-        river_flow(self._packed_curve, 1.0 / self.tau, self.epsilon**-2, p, np.nan, flow)
-        return flow
+        """V(p) [m/s], shape (3,); it does not depend on the time t. It is FOLLOW's on a hand at rest, by 1/τ and 1."""
+        flow = np.empty(6)
+        gains = FollowGains(1.0 / self.tau, 1.0, self.epsilon**-2, 0.0)
+        follow_at(gains, self._packed_curve, 0, np.nan, p, np.zeros(3), flow)
+        return flow[:3]
 
 
-class Course(NamedTuple):
-    """Integral curve of a flow.
-
-    Attributes
-    ----------
-    times : Array
-        [s], shape (n,).
-    points : Array
-        In the hand frame H [m], shape (n, 3).
-    """
-
-    times: Array
-    points: Array
-
-
-def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Course:
-    """Integral curve ṗ = V(t, p) of a flow, by scipy's DOP853 with tolerance 1e-10.
+def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Array:
+    """Points of an integral curve ṗ = V(t, p) of a flow, in H [m], (n, 3), by scipy's DOP853 with tolerance 1e-10.
 
     Parameters
     ----------
@@ -142,4 +111,4 @@ def integrate(flow: Flow, start: npt.ArrayLike, times: npt.ArrayLike) -> Course:
     )  # fmt: skip
     if not solution.success:
         raise ControllerError(f"the flow could not be integrated from {start}: {solution.message}")
-    return Course(output_times, np.ascontiguousarray(solution.y.T))
+    return np.ascontiguousarray(solution.y.T)

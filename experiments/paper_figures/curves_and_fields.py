@@ -104,7 +104,7 @@ def v_plus_u(runs: Path) -> Figure:
     river = River(curve, epsilon=0.08, tau=mode.damping / mode.stiffness, drag=mode.damping)
     performed = performance(t, p)
     times = t[::8] - t[0]
-    course = integrate(Edited(river, (performed,), (1.0,)).flow, performed.point(0.0), times).points
+    course = integrate(Edited(river, (performed,), (1.0,)).flow, performed.point(0.0), times)
     rms_error = MILLIMETRES * np.sqrt(np.mean(np.sum((course - performed.point(times)) ** 2, axis=1)))
     figure = Figure(figsize=(7.2, 3.9), layout="constrained")
     ring = MILLIMETRES * curve.point(np.linspace(curve.start, curve.end, COURSE_POINTS))

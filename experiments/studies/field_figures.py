@@ -177,7 +177,7 @@ def edited_figure() -> Figure:
     _draw_plane(ax, [river.curve], 0.0)
     for weight, colour in ((0.5, TUBE), (1.0, FIELD)):
         edited = Edited(river, (performed,), (weight,))
-        course = 1e3 * integrate(edited.flow, performed.point(0.0), times).points
+        course = 1e3 * integrate(edited.flow, performed.point(0.0), times)
         ax.plot(
             course[:, 0], course[:, 1], color=colour, lw=2.5, alpha=0.7, label=f"integral curve of V + {weight:g} U"
         )

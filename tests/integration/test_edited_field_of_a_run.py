@@ -24,5 +24,5 @@ def test_edited_field_reproduces_a_push_on_the_phantom(direction):
     pushed = np.linalg.norm(p - CURVE.point(t[:, 0]), axis=1).max()
     assert pushed > 4e-3
     edited = Edited(river, (performance(t[:, 0], p),), (1.0,))
-    course = integrate(edited.flow, edited.performed[0].point(0.0), t[::17, 0])
-    assert np.sqrt(np.mean(np.sum((course.points - p[::17]) ** 2, axis=1))) < 1e-4
+    points = integrate(edited.flow, edited.performed[0].point(0.0), t[::17, 0])
+    assert np.sqrt(np.mean(np.sum((points - p[::17]) ** 2, axis=1))) < 1e-4

@@ -7,11 +7,13 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from controllers.curves.trajectory import Trajectory, curve_point, curve_velocity
+from controllers.fields.algebra.weights import window
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force
-from controllers.fields.river import window
+from controllers.fields.higher_order import mismatch
 from controllers.safety.limiter import force_ceiling
 from geometry import rotations
+from geometry.easing import smooth_step
 
 casadi.GlobalOptions.setNumpyMode(1)
 RNG = np.random.default_rng(5)
@@ -29,6 +31,8 @@ def _symbolic(kernel, arity):
         (follow_force, 6),
         (window, 1),
         (gaussian, 2),
+        (mismatch, 4),
+        (smooth_step, 1),
         (force_ceiling, 3),
         (rotations.multiply, 8),
         (rotations.relative, 8),

@@ -25,8 +25,8 @@ from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import River
 from controllers.certificates.report import Verdict
+from controllers.fields.algebra.weights import window
 from controllers.fields.follow import PACE_RANGE
-from controllers.fields.river import window
 from controllers.safety.energy_tank import river_power
 from geometry.arrays import Array
 

@@ -9,9 +9,9 @@ import casadi
 
 from controllers.certificates.loop.device import FUNCTIONS_KEPT, Device, Symbol, matrix, vector
 from controllers.curves.trajectory import PIECE, piece_acceleration, piece_point, piece_velocity
+from controllers.fields.algebra.weights import window
 from controllers.fields.bunny import gaussian
 from controllers.fields.follow import follow_force, parallel_pace
-from controllers.fields.river import window
 from controllers.fields.stretchy_tubes import stretch_force
 
 

@@ -8,13 +8,13 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Program
-from controllers.fields.algebra.weights import Weight
+from controllers.fields.algebra.weights import Weight, window
 from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.own.own_law import PythonLaw
-from controllers.fields.river import River, window
+from controllers.fields.river import River
 from controllers.state import HandState
 from tests.controllers.fields.field_probes import force_of, largest_jump
 
