@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 
 from controllers.curves.bounds import NODE
-from controllers.curves.closest_point import chord_square, nearest_on_piece
-from controllers.curves.trajectory import BREAKS, COEFFICIENTS, LEVELS, PERIODIC, PIECE, PIECES, TREE
+from controllers.curves.closest_point import Pieces, chord_square, nearest_on_piece, pieces_of
+from controllers.curves.trajectory import PERIODIC
 from controllers.work_array import work_array, work_integers
 from geometry.arrays import Array, IntArray
 
@@ -24,11 +24,9 @@ SAME_BRANCH = 0.1
 
 @njit
 def _find_runs(
-    blob: Array, at: int, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array
+    blob: Array, pieces: Pieces, px: float, py: float, pz: float, radius: float, runs: IntArray, scratch: Array
 ) -> int:
     """Write the runs of pieces nearer than the radius, as rows [first, last, likely nearest]; returns their number."""
-    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
-    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
     nodes = work_integers(64)
     nodes[0] = 1
     top, count = 1, 0
@@ -36,21 +34,18 @@ def _find_runs(
     while top > 0:
         top -= 1
         node = nodes[top]
-        chord = math.sqrt(chord_square(blob, tree + NODE * node, px, py, pz))
-        thickness = blob[tree + NODE * node + 7]
+        chord = math.sqrt(chord_square(blob, pieces.tree + NODE * node, px, py, pz))
+        thickness = blob[pieces.tree + NODE * node + 7]
         if chord - thickness >= radius:
             continue
-        if node < first_leaf:
+        if node < pieces.first_leaf:
             # The left child is popped first, so that pieces are visited in the order of their phases.
             nodes[top], nodes[top + 1] = 2 * node + 1, 2 * node
             top += 2
             continue
-        piece = int(node) - first_leaf
-        if chord + thickness >= radius:
-            h = blob[breaks + piece + 1] - blob[breaks + piece]
-            square, _ = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
-            if square >= radius * radius:
-                continue
+        piece = int(node) - pieces.first_leaf
+        if chord + thickness >= radius and nearest_on_piece(blob, pieces, piece, px, py, pz, scratch)[0] >= radius:
+            continue
         if count == 0 or runs[count - 1, 1] != piece - 1:
             if count == BRANCHES:
                 break
@@ -60,10 +55,6 @@ def _find_runs(
         runs[count - 1, 1] = piece
         if chord < likely:
             likely, runs[count - 1, 2] = chord, piece
-    if count > 1 and blob[at + PERIODIC] > 0.0 and runs[0, 0] == 0 and runs[count - 1, 1] == pieces - 1:
-        # One branch across the seam; its last piece lies before its first.
-        count -= 1
-        runs[0, 0] = runs[count, 0] - pieces
     return count
 
 
@@ -91,24 +82,24 @@ def branches(blob: Array, at: int, px: float, py: float, pz: float, radius: floa
     """
     if not np.isfinite(px + py + pz):
         return 0
-    runs, scratch = work_integers((BRANCHES, 3)), work_array((48, 8))
-    pieces, first_leaf = int(blob[at + PIECES]), 1 << int(blob[at + LEVELS])
-    breaks, rows, tree = at + int(blob[at + BREAKS]), at + int(blob[at + COEFFICIENTS]), at + int(blob[at + TREE])
-    count = _find_runs(blob, at, px, py, pz, radius, runs, scratch)
+    runs, scratch, pieces = work_integers((BRANCHES, 3)), work_array((48, 8)), pieces_of(blob, at)
+    count = _find_runs(blob, pieces, px, py, pz, radius, runs, scratch)
+    if count > 1 and blob[at + PERIODIC] > 0.0 and runs[0, 0] == 0 and runs[count - 1, 1] == pieces.number - 1:
+        # One branch across the seam; its last piece lies before its first.
+        count -= 1
+        runs[0, 0] = runs[count, 0] - pieces.number
     for k in range(count):
         best: float = math.inf
         # The likely nearest piece first: its distance then rules out most others.
         for turn in range(runs[k, 0] - 1, runs[k, 1] + 1):
-            piece = int(runs[k, 2] if turn < runs[k, 0] else turn % pieces)
-            leaf = tree + NODE * (first_leaf + piece)
+            piece = int(runs[k, 2] if turn < runs[k, 0] else turn % pieces.number)
+            leaf = pieces.tree + NODE * (pieces.first_leaf + piece)
             bound = best + blob[leaf + 7]
             again = turn >= runs[k, 0] and piece == runs[k, 2]
             if again or chord_square(blob, leaf, px, py, pz) >= bound * bound:
                 continue
-            h = blob[breaks + piece + 1] - blob[breaks + piece]
-            square, u = nearest_on_piece(blob, rows + piece * PIECE, h, px, py, pz, scratch)
-            distance = math.sqrt(square)
+            distance, t = nearest_on_piece(blob, pieces, piece, px, py, pz, scratch)
             if distance < best:
                 best = distance
-                found[k, 0], found[k, 1] = blob[breaks + piece] + u, distance
+                found[k, 0], found[k, 1] = t, distance
     return count

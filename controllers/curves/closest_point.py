@@ -10,6 +10,7 @@ near points (within 1e-11 m) the first one found is returned, which is that of t
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,7 +19,8 @@ from controllers.curves import trajectory as packed
 from controllers.curves.bounds import NODE
 from controllers.curves.trajectory import find_piece, piece_acceleration, piece_point, piece_velocity, wrap_phase
 from controllers.work_array import work_array, work_integers
-from geometry.arrays import Array
+from geometry.arrays import Array, IntArray
+from geometry.vectors import Vector
 
 _TIE_TOLERANCE = 1e-11  # [m] a branch is searched only if it may improve the distance by more than this
 
@@ -79,9 +81,31 @@ def _sign_variations(b: Array) -> int:
     return count
 
 
+class Pieces(NamedTuple):
+    """Pieces of a packed curve: their number, the first leaf of their tree, and offsets of breaks, rows and tree."""
+
+    number: int
+    first_leaf: int
+    breaks: int
+    rows: int
+    tree: int
+
+
+@njit(forceinline=True)
+def pieces_of(blob: Array, at: int) -> Pieces:
+    """Pieces of the curve packed at ``blob[at:]``."""
+    breaks, rows = at + int(blob[at + packed.BREAKS]), at + int(blob[at + packed.COEFFICIENTS])
+    first_leaf = 1 << int(blob[at + packed.LEVELS])
+    return Pieces(int(blob[at + packed.PIECES]), first_leaf, breaks, rows, at + int(blob[at + packed.TREE]))
+
+
 @njit
-def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: float, b: Array) -> tuple[float, float]:
-    """(d², u) of the point of one piece nearest to p; `b` is scratch of shape (48, 8)."""
+def nearest_on_piece(
+    blob: Array, pieces: Pieces, piece: int, px: float, py: float, pz: float, b: Array
+) -> tuple[float, float]:
+    """(d, t) of the point of one piece nearest to p; `b` is scratch of shape (48, 8)."""
+    start, row = blob[pieces.breaks + piece], pieces.rows + piece * packed.PIECE
+    h = blob[pieces.breaks + piece + 1] - start
     best, best_u = _squared_distance(blob, row, 0.0, px, py, pz), 0.0
     end = _squared_distance(blob, row, h, px, py, pz)
     if end < best:
@@ -131,7 +155,7 @@ def nearest_on_piece(blob: Array, row: int, h: float, px: float, py: float, pz: 
         row_b[5] = right[0]
         row_b[7], right[6], right[7] = 0.5 * (low + high), 0.5 * (low + high), high
         top += 2
-    return best, best_u
+    return math.sqrt(best), start + best_u
 
 
 @njit
@@ -151,8 +175,59 @@ def _is_out_of_reach(blob: Array, node: int, square: float, best: float) -> bool
     return square >= reach * reach
 
 
+class _Scratch(NamedTuple):
+    """Work arrays of a search: a stack of nodes, the squared distances to their chords, and that of a piece."""
+
+    nodes: IntArray
+    squares: Array
+    piece: Array
+
+
+@njit(forceinline=True)
+def _leaf_near(blob: Array, at: int, pieces: Pieces, guess: float, px: float, py: float, pz: float) -> int:
+    """Leaf of the piece at a phase, after a Newton step: the hand may have moved over some pieces since."""
+    guess = wrap_phase(blob, at, guess)
+    piece = find_piece(blob, at, guess)
+    f, slope = _quintic(blob, pieces.rows + piece * packed.PIECE, guess - blob[pieces.breaks + piece], px, py, pz)
+    if slope > 0.0:
+        piece = find_piece(blob, at, wrap_phase(blob, at, guess - f / slope))
+    return pieces.first_leaf + piece
+
+
+@njit(forceinline=True)
+def _search_below(
+    blob: Array, pieces: Pieces, node: int, square: float, p: Vector, found: tuple[float, float], scratch: _Scratch
+) -> tuple[float, float]:
+    """(d, t) of the point nearest to p below a node of the tree, or those already `found` if none is nearer.
+
+    `square` is the squared distance of p to the node's chord.
+    """
+    (px, py, pz), (best, best_t), (nodes, squares, work) = p, found, scratch
+    nodes[0], squares[0] = node, square
+    top = 1
+    while top > 0:
+        top -= 1
+        node = int(nodes[top])
+        if _is_out_of_reach(blob, pieces.tree + NODE * node, squares[top], best):
+            continue
+        if node < pieces.first_leaf:
+            near, far = 2 * node, 2 * node + 1
+            near_square = chord_square(blob, pieces.tree + NODE * near, px, py, pz)
+            far_square = chord_square(blob, pieces.tree + NODE * far, px, py, pz)
+            if far_square < near_square:
+                near, far, near_square, far_square = far, near, far_square, near_square
+            nodes[top], squares[top] = far, far_square
+            nodes[top + 1], squares[top + 1] = near, near_square
+            top += 2
+        elif node - pieces.first_leaf < pieces.number:
+            distance, t = nearest_on_piece(blob, pieces, node - pieces.first_leaf, px, py, pz, work)
+            if distance < best - _TIE_TOLERANCE:
+                best, best_t = distance, t
+    return best, best_t
+
+
 @njit
-def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:  # noqa: C901 - all cases of a piece inline, once per tick
+def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: float) -> tuple[float, float]:
     """Phase t* of the point of the curve packed at ``blob[at:]`` that is nearest to p, over the whole curve.
 
     Parameters
@@ -169,67 +244,28 @@ def closest_phase(blob: Array, at: int, px: float, py: float, pz: float, guess: 
     t, distance : float
         t* [s] and |φ(t*) − p| [m], exact to 1e-11 m. NaN distance if p is not finite.
     """
+    start = float(blob[at + packed.START])
     if not np.isfinite(px + py + pz):
-        return blob[at + packed.START], np.nan
-    pieces, first_leaf = int(blob[at + packed.PIECES]), 1 << int(blob[at + packed.LEVELS])
-    breaks, rows, tree = (
-        at + int(blob[at + packed.BREAKS]),
-        at + int(blob[at + packed.COEFFICIENTS]),
-        at + int(blob[at + packed.TREE]),
-    )
-    scratch = work_array((48, 8))
-    nodes, squares = work_integers(64), work_array(64)
-    best: float = math.inf
-    best_t = float(blob[at + packed.START])
+        return start, np.nan
+    pieces, found = pieces_of(blob, at), (math.inf, start)
+    scratch = _Scratch(work_integers(64), work_array(64), work_array((48, 8)))
     # From the leaf of the guess upwards, the sibling of each ancestor is searched if it is in reach; without a guess,
     # the search starts at the root.
-    below = 1
-    if np.isfinite(guess):
-        guess = wrap_phase(blob, at, guess)
-        # The hand may have moved over some pieces since: a Newton step follows it over them.
-        piece = find_piece(blob, at, guess)
-        f, slope = _quintic(blob, rows + piece * packed.PIECE, guess - blob[breaks + piece], px, py, pz)
-        if slope > 0.0:
-            guess = wrap_phase(blob, at, guess - f / slope)
-        below = first_leaf + find_piece(blob, at, guess)
-    nodes[0], squares[0] = below, 0.0
-    top = 1
+    below = _leaf_near(blob, at, pieces, guess, px, py, pz) if np.isfinite(guess) else 1
+    node, square = below, 0.0
     while True:
-        while top > 0:
-            top -= 1
-            node = int(nodes[top])
-            if _is_out_of_reach(blob, tree + NODE * node, squares[top], best):
-                continue
-            if node < first_leaf:
-                near, far = 2 * node, 2 * node + 1
-                near_square = chord_square(blob, tree + NODE * near, px, py, pz)
-                far_square = chord_square(blob, tree + NODE * far, px, py, pz)
-                if far_square < near_square:
-                    near, far, near_square, far_square = far, near, far_square, near_square
-                nodes[top], squares[top] = far, far_square
-                nodes[top + 1], squares[top + 1] = near, near_square
-                top += 2
-            elif node - first_leaf < pieces:
-                piece = node - first_leaf
-                start = blob[breaks + piece]
-                h = blob[breaks + piece + 1] - start
-                square, u = nearest_on_piece(blob, rows + piece * packed.PIECE, h, px, py, pz, scratch)
-                distance = math.sqrt(square)
-                if distance < best - _TIE_TOLERANCE:
-                    best, best_t = distance, start + u
+        if not _is_out_of_reach(blob, pieces.tree + NODE * node, square, found[0]):
+            found = _search_below(blob, pieces, node, square, (px, py, pz), found, scratch)
         if below == 1:
-            break
-        sibling = below ^ 1
-        squares[0] = chord_square(blob, tree + NODE * sibling, px, py, pz)
-        below //= 2
-        if _is_out_of_reach(blob, tree + NODE * sibling, squares[0], best):
+            return found[1], found[0]
+        node, below = below ^ 1, below // 2
+        head = pieces.tree + NODE * node
+        square = chord_square(blob, head, px, py, pz)
+        if _is_out_of_reach(blob, head, square, found[0]):
             continue
-        nodes[0], top = sibling, 1
-        head = tree + NODE * sibling
-        if (px - blob[head]) ** 2 + (py - blob[head + 1]) ** 2 + (pz - blob[head + 2]) ** 2 < best * best:
+        if (px - blob[head]) ** 2 + (py - blob[head + 1]) ** 2 + (pz - blob[head + 2]) ** 2 < found[0] * found[0]:
             # Another run of pieces starts nearer, so the guess is far off: search from the root, with this bound.
-            nodes[0], squares[0], below = 1, 0.0, 1
-    return best_t, best
+            node, square, below = 1, 0.0, 1
 
 
 @njit
