@@ -5,7 +5,7 @@ encoder quantisation and velocity filter are those of the servo. Coulomb frictio
 within the period, at most f_c. The law is the executed kernel.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -193,36 +193,45 @@ def counterexample(
         The counterexample; empty if there is none.
     """
     curve, period, smooth = river.curve, river.sampling.period, field.form == "smooth"
-    place, along = curve.point(phase), curve.velocity(phase)
     before = phase - APPROACH_TIME if curve.periodic else max(phase - APPROACH_TIME, curve.start + 1e-3)
     at = int(np.argmin(np.abs(river.phases() - phase)))
-    loop, here = _at_phase(river.loop(), at), curve.point(river.phases()[at])
+    loop, here, start = _at_phase(river.loop(), at), curve.point(river.phases()[at]), curve.point(before)
+    rest = np.zeros(3)
+    first = course(field, loop, here, start, rest, period, river.device).river[0]
+    approach = start, rest if first in (-1.0, own) else curve.velocity(before)
+    meeting = None if smooth else (curve.point(phase), 0.5 * (curve.velocity(phase) + towards))
+    for p, v, push, pushed in _hands(approach, meeting, curve.velocity(phase), towards, pushes):
+        searched = course(field, loop, here, p, v, SEARCH_TIME, river.device, push)
+        found = failure(searched.river, period, own, pushed, smooth)
+        if found is None:
+            continue
+        confirmed = failure(simulate(p, v, SEARCH_TIME, push).river, period, own, pushed, smooth)
+        if confirmed is not None and confirmed.kind == found.kind:
+            return {
+                "kind": found.kind, "time": found.time, "simulated_time": confirmed.time,
+                "force": [float(f) for f in push.force], "push_start": push.start,
+                "push_duration": push.duration, "river": own, "p": p, "v": v,
+            }  # fmt: skip
+    return {}
+
+
+def _hands(
+    approach: tuple[Array, Array], meeting: tuple[Array, Array] | None, along: Array, towards: Array,
+    pushes: Iterable[float],
+) -> Iterator[tuple[Array, Array, Push, bool]]:  # fmt: skip
+    """Hands that `counterexample` tries: p and v at the start, the push, and whether another river may take it.
+
+    `approach` and `meeting` are p and v on the river before the phase, and at it, where no hand starts without one.
+    """
     ahead = along / np.linalg.norm(along)
     aside = towards - ahead * (ahead @ towards)
     aside = aside / max(float(np.linalg.norm(aside)), 1e-12)
-    start, rest = curve.point(before), 0.0 * ahead
-    first = course(field, loop, here, start, rest, period, river.device).river[0]
-    velocity = rest if first in (-1.0, own) else curve.velocity(before)
     for newtons in pushes:
-        directions = [rest] if newtons == 0.0 else [aside, -aside, ahead, -ahead]
-        hands = [(start, velocity, direction) for direction in directions]
-        if newtons == 0.0 and not smooth:
-            hands.append((place, 0.5 * (along + towards), rest))
-        for p, v, direction in hands:
+        for direction in [0.0 * ahead] if newtons == 0.0 else [aside, -aside, ahead, -ahead]:
             push = Push(tuple((newtons * direction).tolist()), APPROACH_TIME - 0.15, 0.2)
-            pushed = newtons > 0.0 or p is place
-            searched = course(field, loop, here, p, v, SEARCH_TIME, river.device, push)
-            found = failure(searched.river, period, own, pushed, smooth)
-            if found is None:
-                continue
-            confirmed = failure(simulate(p, v, SEARCH_TIME, push).river, period, own, pushed, smooth)
-            if confirmed is not None and confirmed.kind == found.kind:
-                return {
-                    "kind": found.kind, "time": found.time, "simulated_time": confirmed.time,
-                    "force": [float(f) for f in push.force], "push_start": push.start,
-                    "push_duration": push.duration, "river": own, "p": p, "v": v,
-                }  # fmt: skip
-    return {}
+            yield *approach, push, newtons > 0.0
+        if newtons == 0.0 and meeting is not None:
+            yield *meeting, Push((0.0, 0.0, 0.0), APPROACH_TIME - 0.15, 0.2), True
 
 
 def _at_phase(loop: SampledLoop, at: int) -> SampledLoop:
