@@ -41,7 +41,7 @@ def _run(program, hands):
 
 def test_branches_are_the_local_minima_of_distance_within_the_ball():
     rng = np.random.default_rng(0)
-    curve = Trajectory(*_eight_samples(), periodic=True)
+    curve = figure_of_eight()
     blob, phases_distances, double_branches = curve.packed(), np.empty((BRANCHES, 2)), 0
     phases = np.linspace(0.0, 4.0, 8001)[:-1]
     for _ in range(400):
@@ -55,13 +55,6 @@ def test_branches_are_the_local_minima_of_distance_within_the_ball():
             assert phases_distances[:count, 1].min() == pytest.approx(closest_phase(blob, 0, *p, np.nan)[1], abs=1e-11)
         double_branches += count == 2
     assert double_branches > 20
-
-
-def _eight_samples():
-    angle = np.linspace(0.0, 2.0 * np.pi, 129)
-    points = np.stack((0.06 * np.sin(angle), 0.04 * np.sin(2.0 * angle), np.zeros(129)), axis=1)
-    points[-1] = points[0]
-    return 4.0 * angle / (2.0 * np.pi), points
 
 
 def test_one_branch_for_a_ball_over_the_whole_curve_or_across_the_seam():
@@ -379,14 +372,6 @@ def test_non_finite_hand_gives_nan():
     for field in FIELDS:
         assert np.isnan(field.wrench(HandState.at([np.nan, 0, 0])).force).all()
         assert np.isnan(field.wrench(HandState.at([0.05, 0, 0], [np.inf, 0, 0])).force).all()
-
-
-def test_wrench_equals_the_compiled_program():
-    rng = np.random.default_rng(7)
-    for field in FIELDS:
-        for _ in range(50):
-            hand = HandState.at(RING.point(rng.uniform(0, 4)) + rng.normal(size=3) * 0.005, rng.normal(size=3) * 0.08)
-            np.testing.assert_array_equal(field.wrench(hand).force, force_of(field.program(), hand))
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,14 @@ def test_open_switch_pulls_to_the_nearest_point_and_damps() -> None:
     np.testing.assert_allclose(session.at(p, v=v), 150.0 * (nearest - p) - 3.0 * v, atol=1e-4)
 
 
+def test_tube_held_in_the_papers_form_pulls_to_where_the_stylus_was() -> None:
+    session = Session(StretchyTubes(CIRCLE, 150.0, 200.0, 14.0, hold="stylus"))
+    grasped = CIRCLE.point(1.0) * 1.1
+    session.at(grasped)
+    np.testing.assert_array_equal(session.at(grasped, switch=True), 0.0)
+    np.testing.assert_allclose(session.at(grasped + 0.01, switch=True), -200.0 * 0.01, atol=1e-12)
+
+
 def test_held_point_follows_the_stylus_and_pulls_back_to_its_origin() -> None:
     session = Session(TUBES)
     start = np.array([0.052, 0.0, 0.001])

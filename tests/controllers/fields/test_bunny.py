@@ -1,4 +1,4 @@
-"""The bunny convolved with a Gaussian, as in the paper, against quadrature."""
+"""The bunny in the limit of infinite width, and convolved with a Gaussian, as in the paper, against quadrature."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,34 @@ import pytest
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.bunny import Bunny
+from controllers.fields.follow import Follow
 from controllers.state import HandState
 
-CIRCLE = Trajectory.circle(0.0477, 4.0)
+CIRCLE = Trajectory.circle(0.05, 4.0)
+RNG = np.random.default_rng(0)
+HANDS = [HandState.at(RNG.normal(size=3) * 0.04, RNG.normal(size=3) * 0.1, RNG.uniform(0.0, 9.0)) for _ in range(40)]
+
+
+def test_pull_along_the_curve_tends_to_follow_with_the_square_of_the_width():
+    follow = Follow(CIRCLE, 200.0, 4.0, np.inf)
+    for hand in HANDS:
+        static = follow.wrench(hand).force
+        square = np.sum((hand.p - CIRCLE.point(hand.t)) ** 2)
+        widest = Bunny(CIRCLE, 200.0, 4.0, np.inf, "along", "clock").wrench(hand).force
+        np.testing.assert_array_equal(widest, static)
+        for delta in (0.1, 1.0, 10.0):
+            gap = np.linalg.norm(Bunny(CIRCLE, 200.0, 4.0, delta, "along", "clock").wrench(hand).force - static)
+            bound = np.linalg.norm(static) * square / (2.0 * delta**2)
+            assert gap <= bound * (1.0 + 1e-9) + 1e-12
+            assert gap >= bound * (1.0 - square / (2.0 * delta**2)) - 1e-12
+
+
+def test_pull_to_the_point_with_infinite_width_is_a_spring_and_damper():
+    for hand in HANDS:
+        spring = 200.0 * (CIRCLE.point(hand.t) - hand.p) + 4.0 * (CIRCLE.velocity(hand.t) - hand.v)
+        np.testing.assert_allclose(
+            Bunny(CIRCLE, 200.0, 4.0, np.inf, "point", "clock").wrench(hand).force, spring, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), (0.012, -0.007, 0.004), (-0.03, 0.02, 0.01)])
