@@ -45,12 +45,10 @@ def swinging(seed, frames=120, travel=0.0, turns=0.0, amplitude=0.5, phase=0.0):
 
 
 def difference(end, start):
-    """Tangent from one pose to another: root position, then local rotation vectors."""
-    rotations = []
-    for first in range(3, len(start), 4):
-        a, b = (Rotation.from_quat(np.roll(q[first : first + 4], -1)) for q in (start, end))
-        rotations.append((a.inv() * b).as_rotvec())
-    return np.concatenate([end[:3] - start[:3], *rotations])
+    """Tangents between poses (..., nq): root position, then local rotation vectors, shape (..., nv)."""
+    a, b = (Rotation.from_quat(np.reshape(q[..., 3:], (-1, 4)), scalar_first=True) for q in (start, end))
+    turns = (a.inv() * b).as_rotvec().reshape(*np.shape(start)[:-1], -1)
+    return np.concatenate([end[..., :3] - start[..., :3], turns], axis=-1)
 
 
 def stylus(r, angle, z):

@@ -6,7 +6,7 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
-from tests.controllers.clips_for_maps import LEG, assert_same_compiled, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
 
 ROWS = 48
 TURN = 2.0 * np.pi
@@ -67,10 +67,6 @@ def test_frames_at_many_angles_are_identical_to_the_kernel(i):
     for angle, row in zip(angles, frames_at(spline, angles), strict=True):
         interpolate_frames(packed, 0, angle, value, slope)
         np.testing.assert_array_equal(row, value)
-
-
-def test_compiled_map_is_identical():
-    assert_same_compiled(MAP, stylus(0.05, 2.0, 0.004))
 
 
 def test_clips_are_displaced_rigidly_over_the_ground():

@@ -1,27 +1,28 @@
-"""Jacobians of all maps against finite differences on the manifold, and their continuity along lines."""
+"""Maps of clips: compiled as in Python; Jacobians against finite differences on the manifold, and along lines."""
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-from test_composite_map import MAP as COMPOSITE
+from test_composite_map import MAP_WITH_LEGS as COMPOSITE
+from test_cylindrical_map import ARMS as CYLINDRICAL_ARMS
 from test_cylindrical_map import MOVING as CYLINDRICAL
 from test_lifted_map import ARMS, MAP_WITHOUT_LIMBS
 from test_lifted_map import MAP as LIFTED
 
 from controllers.haptic_map.lifting.sites import box
-from tests.controllers.clips_for_maps import stylus
+from tests.controllers.clips_for_maps import assert_same_compiled, difference, stylus
 from tests.derivatives import extrapolated_differences
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 LEGS_OF_ONE = MAP_WITHOUT_LIMBS.with_legs_of(1, ARMS, 0.6)
-MAPS = {"cylindrical": CYLINDRICAL, "composite": COMPOSITE, "lifted": LIFTED, "lifted, legs of one clip": LEGS_OF_ONE}
+MAPS = {
+    "cylindrical": CYLINDRICAL, "cylindrical, legs of one clip": CYLINDRICAL_ARMS, "composite": COMPOSITE,
+    "lifted": LIFTED, "lifted, legs of one clip": LEGS_OF_ONE,
+}  # fmt: skip
 
 
-def differences(end, start):
-    """Tangents from poses (n, nq) to poses: root position, then local rotation vectors, shape (n, nv)."""
-    n = len(end)
-    a, b = (Rotation.from_quat(p[:, 3:].reshape(-1, 4), scalar_first=True) for p in (start, end))
-    return np.concatenate([end[:, :3] - start[:, :3], (a.inv() * b).as_rotvec().reshape(n, -1)], axis=1)
+@pytest.mark.parametrize("name", MAPS)
+def test_compiled_map_is_identical(name):
+    assert_same_compiled(MAPS[name], stylus(0.05, 2.0, 0.004))
 
 
 @pytest.mark.parametrize("name", MAPS)
@@ -34,7 +35,7 @@ def test_jacobian_matches_finite_differences_at_a_thousand_positions(name):
     error = np.zeros(len(x))
     for axis, unit in enumerate(np.eye(7)[:3]):
         poses_at = lambda h, unit=unit: np.array([h_map.pose(at + h * unit) for at in x])  # noqa: E731
-        numeric = extrapolated_differences(poses_at, 0.0, 1e-6, differences)
+        numeric = extrapolated_differences(poses_at, 0.0, 1e-6, difference)
         error = np.maximum(error, np.abs(numeric - jacobians[:, :, axis]).max(axis=1))
     assert (error / (1e-2 + np.abs(jacobians).max(axis=(1, 2)))).max() < 1e-6
     np.testing.assert_array_equal(jacobians[:, :, 3:], 0.0)
@@ -60,7 +61,7 @@ def along(h_map, middle, direction, steps, step):
 def test_pose_is_continuous_along_lines(name):
     for middle, direction in lines():
         poses, rates = along(MAPS[name], middle, direction, 2000, 2e-6)
-        jump = differences(poses[1:], poses[:-1]) - 1e-6 * (rates[1:] + rates[:-1])
+        jump = difference(poses[1:], poses[:-1]) - 1e-6 * (rates[1:] + rates[:-1])
         assert np.abs(jump).max() < 1e-9
 
 
