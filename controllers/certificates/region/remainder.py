@@ -124,6 +124,45 @@ def _mass_terms(axis: Axis, form: Form, cell: Cell, rounding: float) -> _MassTer
     )  # fmt: skip
 
 
+class _Ball(NamedTuple):
+    """√V ≤ 1 for the hands at the corners of a cell: forms P, their inverses, and the units `scale` of the state."""
+
+    forms: Array
+    inverses: Array
+    scale: Array
+
+    @staticmethod
+    def of(axis: Axis, form: Form, cell: Cell) -> "_Ball":
+        """The ball of a form; P⁻¹ is convex in z, so that what is largest over a cell is so at a corner."""
+        forms = np.array([form.numbers(z) for z in cell.corners(2)])
+        return _Ball(forms, np.asarray(np.linalg.inv(forms), dtype=np.float64), axis.scale)
+
+    def largest(self, *numbers: float) -> float:
+        """Largest value of a row vector, given without its last zeros."""
+        row = np.array([*numbers, *np.zeros(len(self.scale) - len(numbers))]) * self.scale
+        return float(np.sqrt(np.einsum("i,nij,j->n", row, self.inverses, row).max()))
+
+    def largest_product(self, e: float, v: float) -> float:
+        """Largest |e| |ν|, by ½(σ|e|² + |ν|²/σ); e and v are the largest |e| and |ν|."""
+        weight = np.diag([0.5 * v / e * self.scale[0] ** 2, 0.5 * e / v * self.scale[1] ** 2])
+        roots = np.linalg.cholesky(self.inverses[:, :2, :2])
+        return float(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ weight @ roots)[:, -1].max())
+
+    def turn_level(self) -> float:
+        """√V of a change of velocity and filtered velocity by 1 m/s, as where φ̇ changes its direction."""
+        row = np.concatenate([[0.0], np.ones(2) / self.scale[1:3], np.zeros(len(self.scale) - 3)])
+        return float(np.sqrt(np.einsum("i,nij,j->n", row, self.forms, row).max()))
+
+    def slide_level(self, form: Form, tube: TubeBounds, e: float) -> float:
+        """Largest change of √V, on √V = 1, per metre by which e moves along the curve."""
+        part = self.forms[:, 0].copy()
+        part[:, 0] = 0.0
+        spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
+        cross = 0.5 * spread / self.scale[0] ** 2 * e
+        cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, self.inverses, part).max())) / self.scale[0]
+        return cross
+
+
 def remainder(
     axis: Axis, form: Form, cell: Cell, tube: TubeBounds, course: Course, share: float, level: float
 ) -> Remainder:
@@ -142,19 +181,12 @@ def remainder(
     level : float
         ℓ, at most 1.
     """
-    t, n, k, b, scale = axis.period, axis.size, axis.stiffness, axis.damping, axis.scale
-    forms = np.array([form.numbers(z) for z in cell.corners(2)])
-    inverses: Array = np.asarray(np.linalg.inv(forms), dtype=np.float64)
-
-    def largest(*numbers: float) -> float:
-        """Largest value of a row vector on ‖x‖ ≤ 1; P⁻¹ is convex in z, so the maximum is at a corner."""
-        row = np.array([*numbers, *np.zeros(n - len(numbers))]) * scale
-        return float(np.sqrt(np.einsum("i,nij,j->n", row, inverses, row).max()))
-
-    e, v, y = (largest(*np.eye(3)[i]) for i in range(3))
-    force = max(largest(k, 0.0, b), largest(*np.eye(n)[-1]) if axis.delay else 0.0)
+    t, k, b = axis.period, axis.stiffness, axis.damping
+    ball = _Ball.of(axis, form, cell)
+    e, v, y = (ball.largest(*np.eye(3)[i]) for i in range(3))
+    force = max(ball.largest(k, 0.0, b), ball.largest(*np.eye(axis.size)[-1]) if axis.delay else 0.0)
     spring, viscous = cell.high[2], cell.high[1]
-    total = largest(k + spring, viscous, b)
+    total = ball.largest(k + spring, viscous, b)
     pace_share, slow_share = b / (b + cell.low[1]), b / (b + viscous)
     pace = pace_share * course.pace
     overshoot = 1.0 + viscous * t / (4.0 * cell.low[0]) + spring * t * t / (8.0 * cell.low[0])
@@ -182,14 +214,14 @@ def remainder(
         + tube.coriolis * speed * (motion + np.sqrt(tube.mass_high) * pace)
         + tube.mass_slope * t * speed * masses.push * total * level
     )
-    slowest = float(scale[2] / np.sqrt(forms[:, 2, 2].max()))  # 1/√p_yy for the largest p_yy of the forms [m/s]
+    slowest = float(ball.scale[2] / np.sqrt(ball.forms[:, 2, 2].max()))  # 1/√p_yy for the largest p_yy [m/s]
     rate = 0.5 * tube.mass_slope * masses.drift * speed
     rate += tube.jacobian_slope * (axis.keep * y + 0.5 * (1.0 - axis.keep) * v * overshoot) / slowest * speed
     drift = tube.jacobian_slope * speed * pace / slowest + 2.0 * masses.place_shift
     if axis.slides:
-        turn, cross = _velocity_level(forms, scale), _slide_level(form, forms, inverses, tube, e, scale)
+        turn, cross = ball.turn_level(), ball.slide_level(form, tube, e)
         second_bend = 0.5 * bend * bend / max(course.curvature, 1e-9)
-        rate += bend * (pace * e + overshoot * _max_product(inverses, scale, e, v) * level) * cross
+        rate += bend * (pace * e + overshoot * ball.largest_product(e, v) * level) * cross
         rate += (bend + second_bend) * v * overshoot * t * speed * cross
         rate += 0.5 * course.acceleration * pace_share / course.slowest * (v * turn + course.cosine)
         drift += pace_share**2 * course.acceleration * turn
@@ -199,26 +231,3 @@ def remainder(
         newtons=SECOND_ORDER_FACTOR * newtons, metric=SECOND_ORDER_FACTOR * metric,
         shift=masses.velocity_shift, distance=e, speed=v, force=force,
     )  # fmt: skip
-
-
-def _velocity_level(forms: Array, scale: Array) -> float:
-    """√V of a change of velocity and filtered velocity by 1 m/s, as where φ̇ changes its direction."""
-    row = np.concatenate([[0.0], np.ones(2) / scale[1:3], np.zeros(len(scale) - 3)])
-    return float(np.sqrt(np.einsum("i,nij,j->n", row, forms, row).max()))
-
-
-def _slide_level(form: Form, forms: Array, inverses: Array, tube: TubeBounds, e: float, scale: Array) -> float:
-    """Largest change of √V, on √V = 1, per metre by which e moves along the curve."""
-    part = forms[:, 0].copy()
-    part[:, 0] = 0.0
-    spread = abs(float(form.beta[0, 0])) * (tube.mass_high - tube.mass_low)
-    cross = 0.5 * spread / scale[0] ** 2 * e
-    cross += float(np.sqrt(np.einsum("ni,nij,nj->n", part, inverses, part).max())) / scale[0]
-    return cross
-
-
-def _max_product(inverses: Array, scale: Array, e: float, v: float) -> float:
-    """Largest |e| |ν| on ‖x‖ ≤ 1, by ½(σ|e|² + |ν|²/σ)."""
-    weight = np.diag([0.5 * v / e * scale[0] ** 2, 0.5 * e / v * scale[1] ** 2])
-    roots = np.linalg.cholesky(inverses[:, :2, :2])
-    return float(np.linalg.eigvalsh(roots.transpose(0, 2, 1) @ weight @ roots)[:, -1].max())
