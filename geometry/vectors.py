@@ -6,7 +6,8 @@ from numba import njit
 from geometry.arrays import Array
 from geometry.rotations import multiply, relative, rotate
 
-Vector = tuple[float, float, float]
+Triple = tuple[float, float, float]
+Vector = Triple
 Quaternion = tuple[float, float, float, float]
 
 

@@ -25,6 +25,7 @@ from controllers.safety.limiter import magnitude
 from controllers.safety.oscillation import OSCILLATION_GAIN, OscillationDetector, oscillation_gain
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_TIME, HAND_VELOCITY
 from geometry.arrays import Array
+from geometry.vectors import Vector
 
 _PERIOD, _MAX_FORCE, _MAX_CHANGE, _MAX_SPEED, _SPEED_MARGIN, _MARGIN, _SMALL_FORCE, _QUIET_TIME, _RAMP_TIME = range(9)
 _DEAD_MAN, _PERMITTED, _LOW_CORNER, _HIGH_CORNER, _SIZE = 9, 10, 11, 14, 17
@@ -150,9 +151,6 @@ def _limit_slew(params: Array, gate: Array, scale: float, force: Array) -> None:
         gate[GATE_FORCE + i] = force[i]
 
 
-Triple = tuple[float, float, float]
-
-
 @dataclass(frozen=True)
 class Gate:
     """Limits of the force on a real device.
@@ -194,8 +192,8 @@ class Gate:
     slew: float = 1000.0
     speed: float = 1.0
     speed_margin: float = 0.5
-    low: Triple = (-0.10, -0.20, -0.14)
-    high: Triple = (0.10, 0.20, 0.14)
+    low: Vector = (-0.10, -0.20, -0.14)
+    high: Vector = (0.10, 0.20, 0.14)
     margin: float = 0.02
     small: float = 1.0
     quiet: float = 0.05

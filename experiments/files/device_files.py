@@ -12,12 +12,13 @@ from typing import Any, NamedTuple, cast
 
 from experiments.config.run_config import Phantom, Replay, phantom_of
 from experiments.files.json_text import json_text
+from geometry.vectors import Triple
 from geometry.whole_files import atomic_file
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import DeviceIdentity
 from sim.errors import SimError
 from sim.hardware.identification import NAMES, IdentificationResult
-from sim.world.linkage import Linkage, Triple
+from sim.world.linkage import Linkage
 
 _JOINT_QUANTITIES = ("coulomb", "viscous", "inertia")
 _FORMAT_NAME = "hvf-device-1"

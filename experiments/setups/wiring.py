@@ -24,10 +24,10 @@ from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import MapParts, Parts, Settings
 from experiments.setups.session import Session
 from experiments.setups.setups import map_parts, parts_of
+from geometry.vectors import Quaternion
 from models.humanoid.skeleton import rest_pose
 from models.mocap.motion.clip import Clip
 from models.one_blas_thread import on_one_blas_thread
-from models.phantom.kinematics import Quat
 from sim.body.drive import follow_units
 from sim.compilation.kernel_units import units_of_laws, units_of_map
 from sim.compilation.units import Unit
@@ -223,7 +223,7 @@ def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
         measure_in_motion(servo.device)
 
 
-def _start_state(parts: Parts, servo: Servo) -> tuple[Beginning, Quat | None]:
+def _start_state(parts: Parts, servo: Servo) -> tuple[Beginning, Quaternion | None]:
     """Start state of the stylus, and its orientation; if that is None, the gimbal's joints are at zero."""
     hand = first_reading(servo.device)
     if hand is not None:

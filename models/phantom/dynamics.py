@@ -11,7 +11,8 @@ import numpy as np
 from numba import njit
 
 from geometry.physics import GRAVITY
-from models.phantom.kinematics import Matrix3, Scalars3, Vec3
+from geometry.vectors import Triple
+from models.phantom.kinematics import Matrix3, Vec3
 from models.phantom.parameters import PREMIUM_1_5
 
 _P = PREMIUM_1_5
@@ -72,6 +73,6 @@ def coriolis_matrix(theta: Vec3, theta_dot: Vec3) -> Matrix3:
 
 
 @njit
-def gravity_torques(theta: Vec3) -> Scalars3:
+def gravity_torques(theta: Vec3) -> Triple:
     """N(θ) = ∂V/∂θ: the joint torques that hold the arm against gravity along −y of the device frame [N m]."""
     return 0.0, WEIGHT_2 * np.cos(theta[1]), WEIGHT_3 * np.sin(theta[2])

@@ -8,15 +8,14 @@ results are tuples of scalars, so the same source runs in the servo loop and ins
 """
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from geometry.arrays import Array
+from geometry.vectors import Quaternion, Triple, Vector
 from models.phantom.parameters import PREMIUM_1_5
 
-Vec3 = npt.NDArray[np.float64] | tuple[float, float, float]
-Scalars3 = tuple[float, float, float]
-Quat = tuple[float, float, float, float]
-Matrix3 = tuple[Scalars3, Scalars3, Scalars3]
+Vec3 = Array | Vector
+Matrix3 = tuple[Vector, Vector, Vector]
 
 # numba freezes globals, not attributes of a dataclass.
 L1 = PREMIUM_1_5.l1
@@ -31,19 +30,19 @@ R_HP: Matrix3 = ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
 @njit
-def vector_to_hand_frame(v_P: Vec3) -> Scalars3:
+def vector_to_hand_frame(v_P: Vec3) -> Vector:
     """v_H = R_HP v_P, for points (P and H have one origin), velocities and forces alike."""
     return -v_P[2], -v_P[0], v_P[1]
 
 
 @njit
-def vector_to_device_frame(v_H: Vec3) -> Scalars3:
+def vector_to_device_frame(v_H: Vec3) -> Vector:
     """v_P = R_HPᵀ v_H, for points (P and H have one origin), velocities and forces alike."""
     return -v_H[1], v_H[2], -v_H[0]
 
 
 @njit
-def forward_kinematics(theta: Vec3) -> Scalars3:
+def forward_kinematics(theta: Vec3) -> Vector:
     """Position of the gimbal centre.
 
     x = sin θ1 ρ, y = l2 − l2 cos θ3 + l1 sin θ2, z = −l1 + cos θ1 ρ with ρ = l1 cos θ2 + l2 sin θ3.
@@ -133,7 +132,7 @@ def within_limits(theta: Vec3) -> bool:
 
 
 @njit
-def clamped_to_limits(theta: Vec3) -> Scalars3:
+def clamped_to_limits(theta: Vec3) -> Triple:
     """Joint angles [rad] brought within the limits, the upper arm's before the forearm's."""
     turret = min(max(theta[0], LIMIT[0][0]), LIMIT[0][1])
     upper = min(max(theta[1], LIMIT[1][0], LIMIT[2][0] - ELBOW_LIMIT[1]), LIMIT[1][1], LIMIT[2][1] - ELBOW_LIMIT[0])
@@ -149,7 +148,7 @@ def inside_workspace(p_P: Vec3) -> bool:
 
 
 @njit
-def joint_torques(theta: Vec3, f_P: Vec3) -> Scalars3:
+def joint_torques(theta: Vec3, f_P: Vec3) -> Triple:
     """τ = Jᵀ F: torques at the joints [N m] that give the force F at the tip [N], in the device frame."""
     j = jacobian(theta)
     return (
@@ -175,7 +174,7 @@ def min_singular_value(theta: Vec3) -> float:
 
 
 @njit
-def force_from_torques(theta: Vec3, torque: Vec3, least: float) -> Scalars3:
+def force_from_torques(theta: Vec3, torque: Vec3, least: float) -> Vector:
     """F = J⁻ᵀ τ: force at the tip [N] equivalent to torques at the joints [N m], in the device frame.
 
     The inverse of `joint_torques`; zero where `min_singular_value` is below `least` [m/rad].
@@ -192,7 +191,7 @@ def force_from_torques(theta: Vec3, torque: Vec3, least: float) -> Scalars3:
 
 
 @njit
-def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quat:
+def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quaternion:
     """Orientation of the stylus in the hand frame.
 
     R_HS = R_z(θ1) R_y(θ3) R_z(g1) R_y(g2) R_x(g3): the forearm, then yaw about it, pitch, and roll about the pen.
@@ -227,7 +226,7 @@ def stylus_orientation(theta: Vec3, gimbal: Vec3) -> Quat:
 
 
 @njit
-def stylus_axes(theta: Vec3, gimbal: Vec3) -> tuple[Scalars3, Scalars3, Scalars3, Scalars3, Scalars3]:
+def stylus_axes(theta: Vec3, gimbal: Vec3) -> tuple[Vector, Vector, Vector, Vector, Vector]:
     """Rotation axes of the stylus in H for θ1, θ3, g1, g2, g3: ω = Σ a_j q̇_j, the Jacobian of `stylus_orientation`.
 
     Parameters
@@ -248,7 +247,7 @@ def stylus_axes(theta: Vec3, gimbal: Vec3) -> tuple[Scalars3, Scalars3, Scalars3
 
 
 @njit
-def gimbal_angles(theta: Vec3, q_HS: Quat) -> Scalars3:
+def gimbal_angles(theta: Vec3, q_HS: Quaternion) -> Triple:
     """Inverse of `stylus_orientation`: gimbal angles that turn the stylus to q_HS, with −π/2 ≤ g2 ≤ π/2 [rad]."""
     s1, c1 = np.sin(0.5 * theta[0]), np.cos(0.5 * theta[0])
     s3, c3 = np.sin(0.5 * theta[2]), np.cos(0.5 * theta[2])
@@ -265,7 +264,7 @@ def gimbal_angles(theta: Vec3, q_HS: Quat) -> Scalars3:
 
 
 @njit
-def encoder_reading(theta: Vec3) -> Scalars3:
+def encoder_reading(theta: Vec3) -> Triple:
     """Joint angles as measured by the motor encoders: rounded to the nearest count [rad]."""
     return (
         ENCODER_STEP[0] * np.rint(theta[0] / ENCODER_STEP[0]),
@@ -275,7 +274,7 @@ def encoder_reading(theta: Vec3) -> Scalars3:
 
 
 @njit
-def gimbal_reading(gimbal: Vec3) -> Scalars3:
+def gimbal_reading(gimbal: Vec3) -> Triple:
     """Gimbal angles as measured by their encoders: rounded to the nearest count [rad]."""
     return (
         GIMBAL_STEP * np.rint(gimbal[0] / GIMBAL_STEP),

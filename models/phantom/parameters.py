@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-Triple = tuple[float, float, float]
+from geometry.vectors import Triple
+
 Pair = tuple[float, float]
 
 

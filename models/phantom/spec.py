@@ -5,7 +5,8 @@ from importlib.resources import files
 import mujoco
 import numpy as np
 
-from models.phantom.parameters import PREMIUM_1_5, Pair, Triple
+from geometry.vectors import Triple, Vector
+from models.phantom.parameters import PREMIUM_1_5, Pair
 
 MOTOR_JOINTS = ("theta1", "theta2", "theta3")
 LINKAGE_JOINTS = (*MOTOR_JOINTS, "elbow", "twin")  # motors, and joints that close the loop: see `linkage_angles`
@@ -15,7 +16,7 @@ MOTORS = ("motor1", "motor2", "motor3")
 _NEGLIGIBLE_INERTIA = 1e-14  # MuJoCo requires every moving body to have a mass and inertia [kg], [kg m²]
 
 
-def _set_inertia(spec: mujoco.MjSpec, body: str, mass: float, com: Triple, about_com: Triple) -> None:
+def _set_inertia(spec: mujoco.MjSpec, body: str, mass: float, com: Vector, about_com: Triple) -> None:
     item = spec.body(body)
     item.explicitinertial = True
     item.mass, item.ipos, item.inertia = mass, np.array(com), np.array(about_com)

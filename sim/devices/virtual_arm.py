@@ -16,10 +16,9 @@ from numba import njit
 
 from controllers.safety.faults import Fault
 from geometry.arrays import Array
+from geometry.vectors import Quaternion, Vector
 from models.phantom.dynamics import gravity_torques
 from models.phantom.kinematics import (
-    Quat,
-    Scalars3,
     Vec3,
     clamped_to_limits,
     force_from_torques,
@@ -43,7 +42,7 @@ _NOT_FINITE, _LEFT_WORKSPACE = int(Fault.READING_NOT_FINITE), int(Fault.LEFT_WOR
 
 
 @njit
-def quaternion_of(rotation: Array) -> Quat:
+def quaternion_of(rotation: Array) -> Quaternion:
     """Unit quaternion wxyz of a rotation matrix (3, 3), with w ≥ 0 (Shepperd 1978: by its largest component)."""
     a, b, c = rotation[0, 0], rotation[1, 1], rotation[2, 2]
     x, y, z = rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
@@ -142,7 +141,7 @@ def pose_fault(fault: float, value: float) -> DriverFault:
 
 
 @njit
-def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Scalars3:
+def tip_force(theta: Vec3, torque: Vec3, largest: float) -> Vector:
     """Force at the tip in the device frame [N] equivalent to joint torques [N m], scaled to at most `largest`.
 
     Zero where the Jacobian is nearly singular, or the result is not finite.

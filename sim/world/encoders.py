@@ -20,6 +20,7 @@ from controllers.state import (
 )
 from geometry.arrays import Array
 from geometry.rotations import multiply
+from geometry.vectors import Triple
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,
@@ -32,8 +33,6 @@ from models.phantom.kinematics import (
 )
 from models.phantom.parameters import PREMIUM_1_5
 
-Angles = tuple[float, float, float]
-
 PEAK_TORQUE = PREMIUM_1_5.peak_torque
 COULOMB_FRICTION = PREMIUM_1_5.coulomb_friction
 ANGLES, RATES, SENSED, MEMORY_SIZE = 0, 6, 12, 13
@@ -45,7 +44,7 @@ moves 2.5 mm in this time, which changes the force of a spring of 500 N/m by 1.3
 operating system do not justify a loss of force."""
 
 
-def max_rates() -> Angles:
+def max_rates() -> Triple:
     r"""Upper bound of the joint rates [rad/s]: from stop to stop under the peak torque, :math:`\sqrt{2 P \Delta/M}`.
 
     Friction is neglected and the least inertia M_ii of the workspace is used, so no motor reaches these rates; nor does
@@ -76,8 +75,8 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
     memory: Array,
     keep: float,
     period: float,
-    theta: Angles,
-    gimbal: Angles,
+    theta: Triple,
+    gimbal: Triple,
     t: float,
     switch: float,
     verdict: int,

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geometry.vectors import Triple
 from models.phantom.parameters import PREMIUM_1_5
 from models.phantom.spec import MOTOR_JOINTS
 from models.world.scene import PHANTOM
 from sim.errors import SimError
 from sim.world.world import World
-
-Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

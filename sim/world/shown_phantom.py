@@ -7,11 +7,10 @@ import numpy as np
 from numba import njit
 
 from geometry.arrays import Array, IntArray
+from geometry.vectors import Triple
 from models.phantom.kinematics import gimbal_angles, inverse_kinematics, linkage_angles, vector_to_device_frame
 from models.phantom.spec import GIMBAL_JOINTS, LINKAGE_JOINTS
 from models.world.scene import PHANTOM
-
-Angles = tuple[float, float, float]
 
 
 class ShownPhantom(NamedTuple):
@@ -41,7 +40,7 @@ def shown_phantom(model: mujoco.MjModel, data: mujoco.MjData) -> ShownPhantom:
 
 
 @njit
-def show_angles(shown: ShownPhantom, theta: Angles, gimbal: Angles) -> None:
+def show_angles(shown: ShownPhantom, theta: Triple, gimbal: Triple) -> None:
     """Put the linkage at joint angles [rad], at rest."""
     angles = linkage_angles(theta) + gimbal
     for i in range(8):

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 
 from geometry.arrays import Array
+from geometry.vectors import Quaternion
 from models.humanoid.skeleton import figure_model
 from models.phantom.kinematics import (
-    Quat,
     gimbal_angles,
     inverse_kinematics,
     jacobian,
@@ -72,7 +72,12 @@ class World:
         object.__setattr__(self, "body", body)
 
     def reset(
-        self, p_H: Array, pose: Array, q_HS: Quat | None = None, v_H: Array | None = None, velocity: Array | None = None
+        self,
+        p_H: Array,
+        pose: Array,
+        q_HS: Quaternion | None = None,
+        v_H: Array | None = None,
+        velocity: Array | None = None,
     ) -> None:
         """Put the stylus at a point and the body in a pose, at rest or in motion.
 
@@ -83,7 +88,7 @@ class World:
         pose : Array
             Pose of the figure, shape (75,), or joint angles of the arm [rad], shape (7,); used only if the body is in
             the physics.
-        q_HS : Quat, optional
+        q_HS : Quaternion, optional
             Orientation of the stylus, unit quaternion wxyz; by default the gimbal's joints are at zero.
         v_H : Array, optional
             Velocity of the stylus tip [m/s], shape (3,); by default it rests.
@@ -143,7 +148,7 @@ class World:
 
 
 def place_stylus(
-    model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Quat | None = None, v_H: Array | None = None
+    model: mujoco.MjModel, data: mujoco.MjData, p_H: Array, q_HS: Quaternion | None = None, v_H: Array | None = None
 ) -> None:
     """Reset a world that holds the Phantom, with the stylus tip at a point of the hand frame [m], shape (3,).
 

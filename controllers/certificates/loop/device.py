@@ -9,11 +9,11 @@ import casadi
 
 from controllers.state import Vec3
 from geometry.arrays import Array
+from geometry.vectors import Triple
 
 casadi.GlobalOptions.setNumpyMode(1)
 
 Symbol = Any  # casadi.SX: the library is untyped
-Triple = tuple[float, float, float]
 FUNCTIONS_KEPT = 4  # CasADi functions of devices and laws: a certificate evaluates the same ones for every hand
 
 
