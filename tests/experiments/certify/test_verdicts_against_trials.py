@@ -10,9 +10,8 @@ import pytest
 import hvf
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import NO_HANDS, HandImpedance
-from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, SEEK_LAW
+from controllers.certificates.loop.laws import BUNNY_LAW, SEEK_LAW
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.law import Law
 from controllers.fields.bunny import Bunny
@@ -20,22 +19,16 @@ from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial, simulate
 from experiments.cli import main
 from models.mocap.library import embedded
+from tests.controllers.rivers_for_certificates import CIRCLE, river
 
-CIRCLE = Trajectory.circle(0.0477, 4.0)
 TRIAL_CURVE = Trajectory.circle(0.0477, LAP_DURATION)
-DEVICE = phantom_device()
 
 
 # Without encoder rounding, which would add spurious accelerations to the path.
 WITH_FRICTION = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
-
-
-def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
-    return River(law, k_r, b_d, width, curve, DEVICE, Sampling(1e-3))
 
 
 def simulation(field):

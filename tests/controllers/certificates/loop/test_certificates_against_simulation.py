@@ -6,14 +6,12 @@ import pytest
 
 from controllers.certificates.loop.energy import energy, terminal_speed
 from controllers.certificates.loop.hand import HandImpedance, HandRange
-from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
-from experiments.certify.certified_device import phantom_device
 from experiments.certify.trial_simulation import (
     FULL_CONDITIONS,
     LAP_DURATION,
@@ -25,12 +23,12 @@ from experiments.certify.trial_simulation import (
 )
 from experiments.studies.trial_onset import growth, observed, observed_with_friction, predicted, with_friction
 from sim.users.hand.arm import Arm
+from tests.controllers.rivers_for_certificates import CIRCLE, river
 
 pytestmark = pytest.mark.slow
 
-CIRCLE = Trajectory.circle(0.0477, 4.0)
 STILL = Trajectory.circle(0.0477, LAP_DURATION)
-RIVER = River(FOLLOW_LAW, 300.0, 4.0, 0.25, CIRCLE, phantom_device(), Sampling(1e-3))
+RIVER = river(b_d=4.0)
 
 
 def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):

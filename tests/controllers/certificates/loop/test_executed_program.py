@@ -3,20 +3,10 @@
 import hvf
 from controllers.certificates.loop.executed import examine_curve
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
-from controllers.curves.trajectory import Trajectory
 from controllers.fields.follow import Follow
-from experiments.certify.certified_device import phantom_device
-
-CIRCLE = Trajectory.circle(0.0477, 4.0)
-DEVICE = phantom_device()
-
-
-def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
-    return River(law, k_r, b_d, width, curve, DEVICE, Sampling(1e-3))
+from tests.controllers.rivers_for_certificates import CIRCLE, river
 
 
 def test_executed_radius_matches_symbolic_loop():

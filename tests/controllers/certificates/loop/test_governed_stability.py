@@ -2,19 +2,9 @@
 
 from controllers.certificates.loop.governed import governed_stability, max_drag
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
-from controllers.curves.trajectory import Trajectory
-from experiments.certify.certified_device import phantom_device
-
-CIRCLE = Trajectory.circle(0.0477, 4.0)
-DEVICE = phantom_device()
-
-
-def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE):
-    return River(law, k_r, b_d, width, curve, DEVICE, Sampling(1e-3))
+from tests.controllers.rivers_for_certificates import river
 
 
 def test_governor_drag_is_certified_by_circle_criterion_or_refuted_if_unstable():

@@ -6,17 +6,13 @@ import pytest
 from controllers.certificates.loop.injected import BANDS, activity, injection
 from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
-from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.follow import Follow
 from controllers.safety.energy_tank import river_power
 from controllers.state import HandState
-from experiments.certify.certified_device import phantom_device
+from tests.controllers.rivers_for_certificates import CIRCLE, DEVICE, river
 
-CIRCLE = Trajectory.circle(0.0477, 4.0)
 PACE = 0.0477 * np.pi / 2.0
-DEVICE = phantom_device()
 
 
 def injected(sampling, frequency, amplitude, direction, rounded=True, gains=(300.0, 8.0), periods=40):
@@ -47,9 +43,9 @@ def injected(sampling, frequency, amplitude, direction, rounded=True, gains=(300
 
 def bound(sampling, frequency, speed, gains=(300.0, 8.0)):
     """P̄ [W] for a vibration of RMS speed V [m/s], including the ideal bound."""
-    river = River(FOLLOW_LAW, *gains, 0.25, CIRCLE, DEVICE, sampling)
+    executed = river(FOLLOW_LAW, *gains, sampling=sampling)
     band = next(i for i, f in enumerate(BANDS) if frequency <= f)
-    found = injection(river, river.still())
+    found = injection(executed, executed.still())
     return river_power(gains[1], PACE) + found.activity[band] * speed**2 + found.rounding * speed
 
 
@@ -83,8 +79,7 @@ def test_activity_matches_power_of_the_sampled_loop():
 
 
 def test_slow_motion_has_no_activity_beyond_the_ideal_law():
-    river = River(FOLLOW_LAW, 300.0, 8.0, 0.25, CIRCLE, DEVICE, Sampling(1e-3))
-    found = injection(river, river.still())
+    found = injection(river(), river().still())
     assert found.activity[0] == 0.0
     assert 30.0 < found.passive_below < 300.0
     assert activity(300.0, 8.0, Sampling(1e-6, cutoff=1e5), np.array([1.0]))[0] == pytest.approx(-8.0, rel=1e-3)

@@ -15,7 +15,6 @@ from controllers.certificates.loop.passivity import damping_needed, passivity
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
 from controllers.certificates.loop.stability import (
-    River,
     boundary,
     critical_damping,
     critical_stiffness,
@@ -31,7 +30,6 @@ from controllers.fields.bunny import Bunny
 from controllers.fields.follow import Follow
 from controllers.fields.stretchy_tubes import StretchyTubes, stretchy_wrench
 from controllers.state import HAND_SWITCH, HandState
-from experiments.certify.certified_device import phantom_device
 from models.phantom.dynamics import coriolis_matrix, gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     forward_kinematics,
@@ -41,11 +39,10 @@ from models.phantom.kinematics import (
     vector_to_hand_frame,
 )
 from models.phantom.parameters import PREMIUM_1_5
+from tests.controllers.rivers_for_certificates import CIRCLE, DEVICE, river
 from tests.derivatives import central_differences
 
-DEVICE = phantom_device()
-CIRCLE = Trajectory.circle(0.0477, 4.0)
-RIVER = River(FOLLOW_LAW, 300.0, 4.0, 0.25, CIRCLE, DEVICE, Sampling(1e-3))
+RIVER = river(b_d=4.0)
 PHASES = np.array([0.3, 1.7, 3.1])
 
 
@@ -216,11 +213,11 @@ def test_weak_spring_and_damper_match_the_continuous_approximation():
 
 
 def test_lap_multipliers_do_not_depend_on_the_number_of_steps():
-    river = River(FOLLOW_LAW, 30.0, 1.0, 0.25, Trajectory.circle(0.0477, 0.8), DEVICE, Sampling(1e-3))
+    fast = river(k_r=30.0, b_d=1.0, curve=Trajectory.circle(0.0477, 0.8))
     phases = np.arange(800) * 1e-3
-    whole = SampledLoop(linearise(DEVICE, FOLLOW_LAW, river.curve, phases, NO_HAND, 0.25), river.sampling)
+    whole = SampledLoop(linearise(DEVICE, FOLLOW_LAW, fast.curve, phases, NO_HAND, 0.25), fast.sampling)
     exact = np.abs(whole.multipliers(30.0, 1.0, 1)[0])
-    assert np.log(np.abs(lap_multipliers(river, river.moving())[0])) == pytest.approx(np.log(exact), rel=0.01)
+    assert np.log(np.abs(lap_multipliers(fast, fast.moving())[0])) == pytest.approx(np.log(exact), rel=0.01)
     assert 0.0 < exact < 1.0
 
 
