@@ -29,6 +29,13 @@ _FAST_ROOT_SPEED = 1.0
 Kind = Literal["cycle", "half stride", "way back", "open"]
 
 
+class LostTurn(NamedTuple):
+    """Largest distance of a capture's heading from those of its loop repeated [rad], and when it is [s]."""
+
+    angle: float
+    at: float
+
+
 class LoopedClip(NamedTuple):
     """A looped clip.
 
@@ -42,9 +49,8 @@ class LoopedClip(NamedTuple):
         The part of the capture that was used [s]; `start` is negative for an open clip, which begins at rest before it.
     gap : float
         d between its ends before closing [rad].
-    turns : tuple of float
-        Change of heading in the capture, and what it would be at the loop's yaw rate [rad]; equal if it is the
-        whole clip, and zeros if it is open, has a way back or was closed already.
+    lost_turn : LostTurn
+        How far the capture turns beyond the loop.
     left_out : LeftOut
         What the capture has and its cycle has not.
     """
@@ -54,7 +60,7 @@ class LoopedClip(NamedTuple):
     start: float
     end: float
     gap: float
-    turns: tuple[float, float] = (0.0, 0.0)
+    lost_turn: LostTurn = LostTurn(0.0, 0.0)
     left_out: LeftOut = LeftOut(0.0, 0.0)
 
 
@@ -133,12 +139,26 @@ def _gap(clip: Clip, first: int, last: int) -> float:
 
 
 def _close(clip: Clip, first: int, last: int, gap: float, half: bool = False) -> LoopedClip:
-    """The frames from first to last as a closed lap, and how it turns."""
-    headings = np.unwrap(quaternions.heading(clip.poses[:, 3:7]))
-    turn, own_turn = headings[-1] - headings[0], 0.0 if half else headings[last] - headings[first]
-    turns = float(turn), float(own_turn * (clip.n_frames - 1) / (last - first))
+    """The frames from first to last as a closed lap, and how far the capture turns beyond it."""
     kind, times = "half stride" if half else "cycle", (first / clip.fps, last / clip.fps)
-    return LoopedClip(closed_lap(clip, first, last, half), kind, *times, gap, turns)
+    lap = closed_lap(clip, first, last, half)
+    return LoopedClip(lap, kind, *times, gap, _lost_turn(clip, first, last, half))
+
+
+def _lost_turn(clip: Clip, first: int, last: int, half: bool) -> LostTurn:
+    """How far headings leave those of a lap, both relative to a heading that turns at the lap's rate.
+
+    A pelvis swings to and fro with the legs: between two phases of a straight walk its heading differs by 40°.
+    """
+    headings = np.unwrap(quaternions.heading(clip.poses[:, 3:7]))
+    rate = 0.0 if half else (headings[last] - headings[first]) / (last - first)
+    relative = headings - rate * np.arange(clip.n_frames)
+    own = relative[first : last + 1]
+    if half:
+        own = np.concatenate((own, own[0] + own[-1] - own))
+    beyond = np.maximum(np.maximum(relative - own.max(), own.min() - relative), 0.0)
+    at = int(np.argmax(beyond))
+    return LostTurn(float(beyond[at]), at / clip.fps)
 
 
 def _is_fast(clip: Clip) -> bool:

@@ -15,7 +15,7 @@ from models.mocap.motion.clip import Clip
 from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.fidelity import fidelity
-from models.mocap.preparation.looping import LoopedClip
+from models.mocap.preparation.looping import LoopedClip, LostTurn
 from models.mocap.preparation.pace import Paced
 from models.mocap.preparation.poses import resampled
 from models.mocap.preparation.prepare import HandLoad, Prepared, prepared
@@ -82,9 +82,9 @@ def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
 
 
 def _made(falls: float | None, near: bool) -> Prepared:
-    """A walk as prepared from a capture that turns by 90°, which its cycle does not."""
+    """A walk as prepared from a capture that turns by 90° after 1.2 s, which its cycle does not."""
     clip = embedded("walk")
-    looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, (np.pi / 2.0, 0.1))
+    looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, LostTurn(np.pi / 2.0, 1.2))
     return Prepared(
         clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0),
         Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0), fidelity(clip, clip, looped, 1.0), 0.0, near,
@@ -99,8 +99,9 @@ def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
     assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful
     lines = losses(result)
     assert any("fall at 0.5 m/s², and would fall freely at" in line for line in lines) == named
-    assert "the capture turns by 90°, at the cycle's rate by 6°: --loop open keeps its turns" in lines
-    assert not any("turns by" in line for line in losses(result._replace(looped=looped._replace(turns=(0.4, 0.1)))))
+    assert "at 1.20 s the capture has turned 90° further than its cycle ever does: --loop open keeps its turns" in lines
+    less = looped._replace(lost_turn=LostTurn(0.4, 1.2))
+    assert not any("has turned" in line for line in losses(result._replace(looped=less)))
 
 
 @pytest.mark.parametrize("near", [True, False])
@@ -119,7 +120,7 @@ def test_lines_are_in_the_order_of_importance(near):
         "the physical figure falls at 2.5 s", *(() if near else ("no feasible motion is near",)),
         "a foot slides by 50.0 mm along the floor; 30 at most",
         "contact leaves a residual of", "feet skate by", "a sole goes", "soles stand at",
-        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "the capture turns by 90°",
+        "left_knee is 5.7° beyond its range", "", "flight at 1 s", "joints are", "at 1.20 s the capture has",
         "try --loop START:END",
     ]  # fmt: skip
     assert len(below) == len(starts)

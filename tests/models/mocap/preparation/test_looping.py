@@ -54,7 +54,7 @@ def test_walk_along_a_curve_is_a_cycle_that_turns(turning):
     found = close_or_rest(turned(lambda x: 0.004))
     assert found.kind == "cycle"
     assert found.clip.duration < 2.5 * stride
-    assert found.turns[0] == pytest.approx(found.turns[1], abs=np.deg2rad(10.0))
+    assert found.lost_turn.angle < np.deg2rad(10.0)
 
 
 def test_cycle_of_a_walk_keeps_a_turn_that_lasts_half_of_it(turning):
@@ -66,9 +66,31 @@ def test_cycle_of_a_walk_keeps_a_turn_that_lasts_half_of_it(turning):
 
 def test_turn_that_a_cycle_lacks_is_measured(turning):
     turned, _ = turning
-    found = close_or_rest(turned(lambda x: 0.02 if x > 0.9 else 0.0))
+    clip = turned(lambda x: 0.02 if x > 0.9 else 0.0)
+    found = close_or_rest(clip)
     assert found.kind == "cycle"
-    assert found.turns[0] > np.deg2rad(40.0) > np.deg2rad(15.0) > found.turns[1]
+    assert found.lost_turn.angle > np.deg2rad(40.0)
+    assert found.lost_turn.at == pytest.approx(clip.duration, abs=0.3)
+
+
+def test_turn_and_return_in_the_middle_that_a_cycle_lacks_is_measured(turning):
+    turned, _ = turning
+    found = close_or_rest(turned(lambda x: 0.03 * ((0.45 < x < 0.5) - (0.5 < x < 0.55))))
+    assert found.kind == "cycle"
+    assert np.deg2rad(40.0) < found.lost_turn.angle < np.deg2rad(70.0)
+
+
+def test_swing_of_the_pelvis_in_a_straight_walk_is_no_turn(turning):
+    """Cut where the pelvis is turned left at first and right at last."""
+    turned, stride = turning
+    walk = turned(lambda x: 0.03 * np.cos(22.0 * np.pi * x))
+    quarter = round(stride * walk.fps / 4.0)
+    cut = Clip(walk.poses[quarter:-quarter], walk.fps, "cut")
+    ends = np.unwrap(quaternions.heading(cut.poses[:, 3:7]))[[0, -1]]
+    assert abs(ends[1] - ends[0]) > np.deg2rad(30.0)
+    found = close_or_rest(cut)
+    assert found.kind == "cycle"
+    assert found.lost_turn.angle < np.deg2rad(10.0)
 
 
 @pytest.mark.parametrize(("seconds", "kept"), [(0.2, False), (1.2, True)])
