@@ -42,6 +42,7 @@ from models.mocap.retargeting.retarget_report import (
     unit_name,
 )
 from models.mocap.retargeting.skeleton_roles import Roles, joints_below, missing, unused
+from models.mocap.retargeting.slow_steps import slow_step_remarks
 from models.mocap.retargeting.straight_bones import check_bones
 from models.mocap.retargeting.upright import unsupported_time, up_axis
 
@@ -115,6 +116,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
         *padding_remarks(filled, motion.fps, frames.dropped),
         *leg_speed_remarks(legs, motion.fps),
+        *slow_step_remarks(path, legs, hip_to_ankle, figure_leg, motion.fps),
         *in_place_remarks(path, hip_to_ankle, motion.fps),
         *joint_jump_remarks([jump for jump in joint_jumps if jump.frame >= frames.dropped], motion),
         *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
