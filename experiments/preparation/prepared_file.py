@@ -19,7 +19,7 @@ _ADDED_MOTION = {"way back": "the way back", "open": "coming to rest at both end
 _MAX_NAMED = 3  # largest number of flights whose reasons are in the line for the terminal
 _MIN_OWN_FRACTION = 0.5  # fraction of the file's own motion in the clip below which it is reported
 _MIN_LEFT_OUT = 0.5  # time of the capture that its cycle lacks, from which it is reported [s]
-# Turn without which a cycle is not called the same motion [°]: 53 of 60 cycles lack at most 18°, the others 34 to 329.
+# Turn without which a cycle is not called the same motion [°]: 89 of 100 cycles lack at most 26°, the others 34 to 329.
 _MAX_LOST_TURN = 30.0
 # Acceleration in flights below which a wrong frame rate is more likely than dancers' hovering feet [m/s²]: jumps have 8
 # to 12, dancers' steps 4 to 7.
