@@ -164,8 +164,10 @@ class _Attempt(NamedTuple):
 def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> _Attempt:
     """Make a looped clip feasible."""
     if (lasts := cycle.clip.duration) > _MAX_DURATION:
+        which = {"cycle": "its cycle", "half stride": "its stride", "way back": "it, with the way back,"}
+        what = f"{which.get(cycle.kind, 'it, at rest at both ends,')} lasts {lasts:.2f} s"
         part = "or a part of it by `hvf prepare --loop START:END`"
-        raise ModelError(f"{path}: lasts {lasts:.2f} s; expected at most {_MAX_DURATION:.0f} s, {part}")
+        raise ModelError(f"{path}: {what}; expected at most {_MAX_DURATION:.0f} s, {part}")
     planted = without_foot_sliding(cycle.clip, smoothed(cycle.clip))
     smooth = smoothed(planted)
     schedule = with_feet_at_rest(stances(planted, smooth), planted)

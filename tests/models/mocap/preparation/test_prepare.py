@@ -123,11 +123,13 @@ def test_part_of_a_long_file_can_be_prepared(long_walk):
     assert result.clip.duration == pytest.approx(2.2, abs=0.01)
 
 
-def test_whole_file_longer_than_120_s_is_refused(long_walk):
-    with pytest.raises(
-        ModelError, match=r"long.bvh: lasts 13\d.* at most 120 s, or a part of it by `hvf prepare --loop START:END`"
-    ):
-        prepared(long_walk, "open")
+@pytest.mark.parametrize(
+    ("loop", "what"), [("open", r"it, at rest at both ends, lasts 13\d"), ("0:125", r"its cycle lasts 125\.00 s")]
+)
+def test_clip_longer_than_120_s_is_refused_with_what_lasts_so_long(long_walk, loop, what):
+    expected = "at most 120 s, or a part of it by `hvf prepare --loop START:END`"
+    with pytest.raises(ModelError, match=rf"long.bvh: {what}.* {expected}"):
+        prepared(long_walk, loop)
 
 
 @pytest.mark.slow
