@@ -93,13 +93,18 @@ def find_cycle(clip: Clip) -> Cycle | None:
         since = float(frames[np.argmax(unlike)]) / clip.fps if unlike.any() else 0.0
         return Cycle(start, end, gap, LeftOut(float(unlike.mean() * clip.duration), since))
 
-    feet_agree = foot_gaps(clip, contacts(clip).planted, frames) < MAX_FOOT_GAP
+    touching = contacts(clip)
+    feet_agree = foot_gaps(clip, touching.planted, frames) < MAX_FOOT_GAP
     if lap.clip.n_frames < clip.n_frames:
         start, end = round(lap.start * clip.fps), round(lap.end * clip.fps)
         cycle = repeated(start, end, lap.gap, _MAX_GAIT_GAP)
         if cycle is not None and feet_agree[start // frame_step, end // frame_step]:
             return cycle
     apart = frames[None, :] - frames[:, None] >= max(_MIN_CYCLE_TIME * clip.fps, _MIN_CYCLE_FRACTION * clip.n_frames)
+    # Contact forces correct what a cross-fade mixes; a flight across the seam has none.
+    supported = touching.supported[frames]
+    on_floor = apart & supported[:, None] & supported
+    apart = on_floor if on_floor.any() else apart
     for pairs in (apart, apart & feet_agree):
         if not pairs.any():
             return None

@@ -6,6 +6,7 @@ import pytest
 from geometry import quaternions
 from models.errors import ModelError
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
+from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.kinematics import sole_points
@@ -91,6 +92,27 @@ def test_swing_of_the_pelvis_in_a_straight_walk_is_no_turn(turning):
     found = close_or_rest(cut)
     assert found.kind == "cycle"
     assert found.lost_turn.angle < np.deg2rad(10.0)
+
+
+def test_cycle_of_jumps_in_place_is_closed_on_the_floor():
+    """They differ in an arm while the body stands, so that poses in flight are more alike."""
+    jump = resampled(embedded("jump"), 60.0)
+    n = jump.n_frames - 1
+    flight = ~contacts(jump).supported[:-1]
+    stands = 1.0 - np.convolve(np.tile(flight, 3), np.hanning(13) / np.hanning(13).sum(), "same")[n : 2 * n]
+    shoulder = slice(7 + 4 * (JOINTS.index("left_shoulder")), 11 + 4 * (JOINTS.index("left_shoulder")))
+    laps = []
+    for k in range(3):
+        lap = jump.poses[:-1].copy()
+        raised = quaternions.exponential(0.15 * k * stands[:, None] * np.array([1.0, 0.0, 0.0]))
+        lap[:, shoulder] = quaternions.product(lap[:, shoulder], raised)
+        laps.append(lap)
+    clip = Clip(np.concatenate(laps), jump.fps, "jumps")
+    found = close_or_rest(clip)
+    assert found.kind == "cycle"
+    supported = contacts(clip).supported
+    assert supported[round(found.start * clip.fps)]
+    assert supported[round(found.end * clip.fps)]
 
 
 @pytest.mark.parametrize(("seconds", "kept"), [(0.2, False), (1.2, True)])
