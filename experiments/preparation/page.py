@@ -12,6 +12,8 @@ from experiments.preparation.prepared_file import Measured, PreparedFile, change
 from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, SEGMENTS, figure_model
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
+from models.mocap.preparation.looping import LoopedClip
+from models.mocap.preparation.prepare import Prepared
 from sim.body.clip_motion import clip_motion
 from sim.viewer.actor import GHOST, Actor
 from sim.viewer.framing import view_offsets
@@ -54,7 +56,7 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
             "What is not within bounds, not certified, or not in the clip",
             (*outcome.faults(), *outcome.doubts, *outcome.advice()),
         )
-        + f'<iframe title="both in 3D" srcdoc="{escape(both_html(prepared.captured, prepared.clip))}"></iframe>'
+        + f'<iframe title="both in 3D" srcdoc="{escape(both_html(prepared))}"></iframe>'
         + picture
         + listed("How the file was read", prepared.report.lines() if prepared.report else ())
     )
@@ -105,20 +107,36 @@ def _draw_row(axes: Axes, clip: Clip) -> None:
     axes.axis("off")
 
 
-def both_html(captured: Clip, prepared: Clip) -> str:
-    """The page: the capture at the back, translucent, and the prepared clip in front, each from its start.
+def captured_beside(clip: Clip, captured: Clip, part: LoopedClip, pace: float, times: Array) -> Array:
+    """Poses (n, 75) of a capture at the moments that its prepared clip shows at times (n,) [s], lap after lap.
+
+    Where the capture has no such moment (coming to rest, the way back, a mirror image) it holds the nearest one. The
+    parameters are those of `models.mocap.preparation.fidelity.fidelity`.
+    """
+    laps, since = np.divmod(times, clip.duration) if clip.closes(CLOSURE_TOLERANCE) else (np.zeros_like(times), times)
+    own_pace = Clip(captured.poses, captured.fps * pace, captured.name)
+    poses = clip_motion(own_pace, np.clip(part.start + since, 0.0, min(part.end, own_pace.duration))).poses
+    for lap in range(1, int(laps.max()) + 1):
+        poses[laps >= lap] = clip.displacement.moved(poses[laps >= lap])
+    return poses
+
+
+def both_html(prepared: Prepared) -> str:
+    """The page: the capture at the back, translucent, and the prepared clip in front, at the same moments.
 
     A closed clip is repeated, an open one holds its last pose. Both are kept in view, and the floor moves under them.
     """
-    longest = max(captured.duration, prepared.duration, _MAX_DURATION if prepared.closes(CLOSURE_TOLERANCE) else 0.0)
+    clip = prepared.clip
+    longest = max(clip.duration, _MAX_DURATION if clip.closes(CLOSURE_TOLERANCE) else 0.0)
     times = np.arange(int(min(longest, _MAX_DURATION) * _REPLAY_FPS) + 1) / _REPLAY_FPS
+    beside = captured_beside(clip, prepared.captured, prepared.looped, prepared.paced.pace, times)
     model = figure_model()
     data = mujoco.MjData(model)
     with unserved() as server, server.atomic():
         scene, shapes = server.scene, body_shapes(model, "")
         figures: list[tuple[Actor, Array, Array, Array]] = []
-        for name, clip, side, colour in (("captured", captured, 1.0, GHOST), ("prepared", prepared, -1.0, "")):
-            poses = clip_motion(clip, times).poses
+        shown = (("captured", beside, 1.0, GHOST), ("prepared", clip_motion(clip, times).poses, -1.0, ""))
+        for name, poses, side, colour in shown:
             aside = np.array([0.0, _SIDE_OFFSET * side, 0.0])
             figures.append(
                 (Actor(scene, name, shapes, 1.0, colour), poses, view_offsets(poses[:, :2], _REPLAY_FPS), aside)
