@@ -29,8 +29,9 @@ six angles, if the pace changes as fast as the hand goes over (`experiments.stud
 CROSS_RATE = 2.0
 """ω with which the figure follows a hand that goes from river to river [1/s]: half of the way after 0.84 s.
 
-Pushed between two pairs of captured gaits, there and back, it has 7.0 to 11.2 % of weight. With 3/s and a pace within 1
-s it falls in one of four runs and has 9 to 22 % in the others, with 2.5/s and 1.5 s 9.5 to 10.9 %."""
+Pushed between two pairs of captured gaits, there and back, it has 6.8 to 12.5 % of weight. When it was chosen, on laps
+that were closed otherwise, it had 7.0 to 11.2 %; with 3/s and a pace within 1 s it fell in one of four runs and had 9
+to 22 % in the others, with 2.5/s and 1.5 s 9.5 to 10.9 %."""
 
 _PUSH_DURATION = 0.6  # [s] duration of a push from one curve to another
 # [s] from the start of a push to the transition: with 0.26 to 0.56 thirteen of fourteen figures that followed the hand

@@ -19,7 +19,7 @@ from models.mocap.preparation.coming_to_rest import departing
 from models.mocap.preparation.poses import add_tangents, smoothed
 from models.mocap.preparation.stances import stances
 
-# T [s]: half or twice changes joints of 19 captures by 0.3 or 0.1° RMS.
+# T [s]: half or twice changes joints of 17 closed captures by 0.4° RMS in the median, 1.1 and 1.2° at most.
 _FADE_TIME = 0.25
 # Duration of a way back [s], and the addition for each radian of the largest joint rotation [s/rad].
 _WAY_BACK_TIMES = (0.6, 1.0)
