@@ -10,6 +10,7 @@ import numpy as np
 from controllers.blending.pair_corrections import neighbouring_pairs
 from controllers.certificates.flight.flight_fit import find_flights, fit_free_fall
 from controllers.haptic_map.animation import ClipMap
+from controllers.state import stylus_path
 from experiments.results.measures.soles import Soles
 from geometry.arrays import Array
 from models.humanoid.skeleton import figure_model, rest_pose
@@ -18,6 +19,7 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.world.scene import SceneConfig
+from sim.reference.reference import map_derivatives, map_poses
 
 
 class MotionMeasure(NamedTuple):
@@ -173,16 +175,16 @@ def _median_and_p90(values: Array) -> tuple[float, float]:
     return float(middle), float(high)
 
 
-def _stylus_pose(angle: float, site: Array) -> Array:
-    return np.array([site[0] * np.cos(angle), site[0] * np.sin(angle), site[1], 1.0, 0.0, 0.0, 0.0])
+def _stylus_poses(angles: Array, places: Array) -> Array:
+    """Poses (n, 7) of an upright stylus at angles (n,) and places (r, z) [m], shape (n, 2)."""
+    return stylus_path(np.column_stack([places[:, 0] * np.cos(angles), places[:, 0] * np.sin(angles), places[:, 1]]))
 
 
 def _condition_numbers(layout: Layout, scale: Array, angles: Array, places: Array) -> Array:
-    numbers: list[float] = []
-    for angle, place in zip(angles, places, strict=True):
-        sigma = np.linalg.svd(scale * layout.haptic_map.jacobian(_stylus_pose(angle, place))[:, :3], compute_uv=False)
-        numbers.append(float(sigma[0] / sigma[2]) if sigma[2] > 1e-9 * sigma[0] else np.inf)
-    return np.array(numbers)
+    jacobians = scale * map_derivatives(layout.haptic_map, _stylus_poses(angles, places))[:, :, :3]
+    sigma = np.linalg.svd(jacobians, compute_uv=False)
+    regular = sigma[:, 2] > 1e-9 * sigma[:, 0]
+    return np.where(regular, sigma[:, 0] / np.where(regular, sigma[:, 2], 1.0), np.inf)
 
 
 def _roughness(
@@ -190,17 +192,17 @@ def _roughness(
 ) -> tuple[float, float]:
     if not pairs:
         return np.nan, np.nan
-    changes: list[float] = []
-    for _ in range(_PROBE_COUNT):
+    points, steps = np.empty((_PROBE_COUNT, 7)), np.zeros((_PROBE_COUNT, 7))
+    for k in range(_PROBE_COUNT):
         i, j = pairs[int(rng.integers(len(pairs)))]
         row, share = int(rng.integers(N_SAMPLES)), float(rng.uniform())
         place = (1.0 - share) * layout.sites[row, i] + share * layout.sites[row, j]
-        x = _stylus_pose(2.0 * np.pi * row / N_SAMPLES, place)
-        step = np.concatenate([rng.normal(size=3), np.zeros(4)])
-        step *= _STEP / np.linalg.norm(step)
-        here, there = (scale * layout.haptic_map.jacobian(x + side * step)[:, :3] for side in (-0.5, 0.5))
-        changes.append(float(np.linalg.norm(there - here) / (np.linalg.norm(here) * _STEP)) / 1e3)
-    return _median_and_p90(np.array(changes))
+        points[k] = _stylus_poses(np.array([2.0 * np.pi * row / N_SAMPLES]), place[None])[0]
+        steps[k, :3] = rng.normal(size=3)
+    steps *= _STEP / np.linalg.norm(steps, axis=1, keepdims=True)
+    here, there = (scale * map_derivatives(layout.haptic_map, points + side * steps)[:, :, :3] for side in (-0.5, 0.5))
+    size = (1, 2)  # Frobenius norm of each derivative
+    return _median_and_p90(np.linalg.norm(there - here, axis=size) / (np.linalg.norm(here, axis=size) * _STEP) / 1e3)
 
 
 def in_between(layout: Layout, i: int, j: int) -> Clip:
@@ -212,12 +214,8 @@ def in_between(layout: Layout, i: int, j: int) -> Clip:
     closed = np.concatenate([layout.sites, layout.sites[:1]])
     middle = 0.5 * (closed[:, i] + closed[:, j])
     places = np.stack([np.interp(samples, np.arange(N_SAMPLES + 1), middle[:, k]) for k in range(2)], axis=1)
-    memory = layout.haptic_map.compiled().memory
-    poses = [
-        layout.haptic_map.pose(_stylus_pose(2.0 * np.pi * row / N_SAMPLES, place), memory)
-        for row, place in zip(samples, places, strict=True)
-    ]
-    return Clip(np.array(poses), frames / float(lap[-1]), f"{layout.names[i]}-{layout.names[j]}")
+    poses = map_poses(layout.haptic_map, _stylus_poses(2.0 * np.pi * samples / N_SAMPLES, places))
+    return Clip(poses, frames / float(lap[-1]), f"{layout.names[i]}-{layout.names[j]}")
 
 
 def lap_times(angles: Array, duration: float) -> Array:

@@ -40,8 +40,8 @@ from sim.reference.reference import (
     along_unit,
     begin_in_motion,
     check_reference,
-    derivative_unit,
-    map_derivative,
+    derivatives_unit,
+    map_derivatives,
     poses_along,
     poses_unit,
 )
@@ -172,7 +172,7 @@ def _required_units(parts: Parts, servo: Servo) -> tuple[Unit, ...]:
         *units_of_laws(parts.program),
         poses_unit(),
     ]
-    units += [derivative_unit()] * parts.begins_in_motion
+    units += [derivatives_unit()] * parts.begins_in_motion
     units += [lower_start_unit()] * (parts.bends and parts.config.body != "robot")
     return (*units, *([along_unit(servo.reference)] * parts.maps.plays_rivers))
 
@@ -215,7 +215,7 @@ def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
         poses_along(reference.stages, reference.params, reference.memory.copy(), argument, poses)
         if parts.bends and world.has_figure:
             lower_start(packed_legs(world.body), poses[0], parts.maps.size)
-        figure_velocity = map_derivative(whole_map, argument[0])[:, :3] @ start.velocity if moves else None
+        figure_velocity = map_derivatives(whole_map, argument)[0, :, :3] @ start.velocity if moves else None
         world.reset(start.point, poses[0], orientation, stylus_velocity, figure_velocity)
         if moves:
             begin_in_motion(reference, np.array(start))

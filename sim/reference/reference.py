@@ -197,24 +197,26 @@ def _initial_reference(compiled: CompiledMap, sizes: tuple[int, int], transition
 
 
 @entry_point
-def _derivative(stages: IntArray, params: Array, x: Array, memory: Array, pose: Array, jacobian: Array) -> None:
-    evaluate_map_jacobian(stages, params, x, memory, pose, jacobian)
+def _derivatives(stages: IntArray, params: Array, points: Array, memory: Array, pose: Array, jacobians: Array) -> None:
+    for i in range(points.shape[0]):
+        evaluate_map_jacobian(stages, params, points[i], memory[i], pose, jacobians[i])
 
 
-def derivative_unit() -> Unit:
-    """The compilation unit of `map_derivative`, without the map's kernels."""
-    matrix, stages = types.Array(types.float64, 2, "C"), types.Array(types.int64, 2, "C")
-    return Unit.of(_derivative, stages, VECTOR, VECTOR, VECTOR, VECTOR, matrix)
+def derivatives_unit() -> Unit:
+    """The compilation unit of `map_derivatives`, without the map's kernels."""
+    stages, jacobians = types.Array(types.int64, 2, "C"), types.Array(types.float64, 3, "C")
+    return Unit.of(_derivatives, stages, VECTOR, _MATRIX, _MATRIX, VECTOR, jacobians)
 
 
-def map_derivative(haptic_map: HapticMap, x: Array) -> Array:
-    """`HapticMap.jacobian` at a stylus pose (7,), bit for bit the same, by kernels from the compilation cache.
+def map_derivatives(haptic_map: HapticMap, points: Array) -> Array:
+    """`HapticMap.jacobian` at stylus poses (n, 7), bit for bit the same, by kernels from the compilation cache.
 
     Returns
     -------
-    Array, shape (nv, 6)
+    Array, shape (n, nv, 6)
     """
     stages, params, memory, _ = haptic_map.compiled()
-    pose, jacobian = np.empty(haptic_map.nq), np.empty((haptic_map.nv, STYLUS_TANGENT))
-    _derivative(linked_stages(stages), params, x, memory, pose, jacobian)
-    return jacobian
+    jacobians = np.empty((len(points), haptic_map.nv, STYLUS_TANGENT))
+    fresh = np.tile(memory, (len(points), 1))
+    _derivatives(linked_stages(stages), params, points, fresh, np.empty(haptic_map.nq), jacobians)
+    return jacobians

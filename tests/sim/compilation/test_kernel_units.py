@@ -19,7 +19,7 @@ from controllers.haptic_map.cylindrical import Cylindrical, cylindrical_map
 from controllers.haptic_map.expressive import express
 from controllers.haptic_map.map_stages import MAP_ARGUMENTS, evaluate_map, kernels_of
 from controllers.haptic_map.robot_arm import robot_arm_map
-from controllers.state import HandState
+from controllers.state import HandState, stylus_path
 from experiments.setups.maps.robot_arm import robot_arm_map as default_arm_map
 from experiments.setups.parts.expression import expressive_figure
 from models.mocap.library import embedded
@@ -28,7 +28,7 @@ from sim.compilation import kernel_units
 from sim.compilation.kernel_units import law_units, linked_stages
 from sim.compilation.unit_cache import cache_folder
 from sim.compilation.units import Unit
-from sim.reference.reference import map_derivative, poses_along
+from sim.reference.reference import map_derivatives, poses_along
 
 ARM = default_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
@@ -52,7 +52,7 @@ def test_unpickled_map_has_the_same_kernels():
 
 def test_map_called_by_address_equals_python_bit_for_bit():
     compiled, rng = ARM.compiled(), np.random.default_rng(1)
-    points = np.hstack((rng.uniform(-0.05, 0.05, (20, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))))
+    points = stylus_path(rng.uniform(-0.05, 0.05, (20, 3)))
     poses = np.empty((20, ARM.nq))
     poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
     np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
@@ -69,9 +69,8 @@ def test_linked_unit_is_also_called_from_python():
 
 
 def test_derivative_called_by_address_equals_python_bit_for_bit():
-    for place in np.random.default_rng(2).uniform(-0.05, 0.05, (5, 3)):
-        x = np.append(place, [1.0, 0.0, 0.0, 0.0])
-        np.testing.assert_array_equal(map_derivative(ARM, x), ARM.jacobian(x))
+    points = stylus_path(np.random.default_rng(2).uniform(-0.05, 0.05, (5, 3)))
+    np.testing.assert_array_equal(map_derivatives(ARM, points), [ARM.jacobian(x) for x in points])
 
 
 def test_field_loaded_from_disk_equals_python_bit_for_bit():
