@@ -71,6 +71,9 @@ def test_turns_beyond_friction_are_reported():
     ginga = embedded("ginga")
     (line,) = doubts(clip_ballistics(Clip(ginga.poses, 4.0 * ginga.fps, "quick")))
     assert line.startswith("turns are refuted: friction permits up to 0.")
+    at_limit = clip_ballistics(Clip(ginga.poses, 1.85 * ginga.fps, "at the limit"))  # missed within 0.24 mm
+    assert at_limit.certificate.verdicts["turns"].verdict == "refuted"
+    assert doubts(at_limit) == ()
 
 
 @pytest.mark.slow
