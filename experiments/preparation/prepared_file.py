@@ -1,6 +1,6 @@
 """A prepared capture with its measures, and what was changed, in words."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def doubts(found: ClipBallistics) -> tuple[str, ...]:
     if ballistic.verdict == "unknown":
         why = "; ".join(part for part in ballistic.reason.split("; ") if part not in certified)
         lines.append(f"whether it is ballistic is unknown: {why}")
-    if turns.verdict == "refuted" and turns.counterexample["distance"] >= _MIN_MISS:
+    if turns.verdict == "refuted" and cast(float, turns.counterexample["distance"]) >= _MIN_MISS:
         lines.append(f"turns are {turns.verdict}: {turns.reason}")
     return tuple(lines)
 
