@@ -192,16 +192,44 @@ def periodic_remainder(poses: Array, s: Array, drift: Array) -> Array:
     return rest
 
 
-def placed_at_origin(poses: Array, s: Array) -> Array:
-    """Poses (n, nq) moved over the ground such that the remainder at phases s (n,) is at the origin, facing +x."""
+def placed_at_origin(poses: Array, s: Array) -> tuple[Array, Array]:
+    r"""Poses moved over the ground such that the remainder at phases s is at the origin, facing +x, and their drift.
+
+    Moved by G ∈ SE(2), the remainder becomes G ρ, and the drift
+
+    .. math:: \mathrm{Ad}_G\,\xi = (R\,v + \omega\,(p_y, -p_x),\; \omega), \qquad G = (p, R) .
+
+    Whole turns are about the middle of the clip; on the spot, it stays there.
+
+    Parameters
+    ----------
+    poses : Array, shape (n, nq)
+    s : Array, shape (n,)
+
+    Returns
+    -------
+    placed : Array, shape (n, nq)
+    drift : Array, shape (3,)
+        ξ of the placed clip.
+    """
     placed = poses.copy()
     placed[:, :2] -= (poses[:, :2] - s[:, None] * (poses[-1, :2] - poses[0, :2])).mean(axis=0)
-    w, _, _, z = periodic_remainder(placed, s, drift_of(placed))[:, 3:7].T
+    drift = drift_of(placed)
+    rest = periodic_remainder(placed, s, drift)
+    whole_turns = not drift[:2].any()
+    middle = rest[:, :2].mean(axis=0) * (drift[2] != 0.0)
+    if whole_turns and np.hypot(*middle) < _MAX_STILL_LENGTH:
+        middle = np.zeros(2)
+    placed[:, :2] -= middle
+    w, _, _, z = rest[:, 3:7].T
     # Mean heading by the doubled half angle, which is independent of the sign of a quaternion.
     heading = np.arctan2(2.0 * (w * z).sum(), (w * w - z * z).sum())
     placed[:, :2] = rotate_in_plane(np.array(-heading), placed[:, :2])
     placed[:, 3:7] = product(about_axis(2, np.full(len(s), -heading)), placed[:, 3:7])
-    return placed
+    if not whole_turns:
+        return placed, drift_of(placed)
+    x, y = rotate_in_plane(np.array(-heading), -middle)
+    return placed, drift[2] * np.array([y, -x, 1.0])
 
 
 def append_reversal(poses: Array, fps: float) -> Array:
@@ -244,8 +272,7 @@ def forward_loop(poses: Array, fps: float) -> Loop:
     other by quintics, so that value, slope and second derivative meet.
     """
     s = np.linspace(0.0, 1.0, len(poses))
-    placed = placed_at_origin(poses, s)
-    drift = drift_of(placed)
+    placed, drift = placed_at_origin(poses, s)
     rest = periodic_remainder(placed, s, drift)
     splines: list[CubicSpline] = []
     for first, stop in [(0, 3), *((k, k + 4) for k in range(3, poses.shape[1], 4))]:

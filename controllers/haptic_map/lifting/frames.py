@@ -151,8 +151,7 @@ class PlacedClip:
     @staticmethod
     def of(poses: Array, angles: Array, closed: bool) -> "PlacedClip":
         """Clip from poses that passed `checked_clip` and angles that passed `checked_angles`."""
-        placed = placed_at_origin(poses, (angles - angles[0]) / _TURN)
-        drift = drift_of(placed)
+        placed, drift = placed_at_origin(poses, (angles - angles[0]) / _TURN)
         # At the angle θ₀ the drift has already moved the figure by the share θ₀/2π of a lap.
         shift, heading = plane_exponential(angles[0] / _TURN * drift)
         placed[:, :2] = rotate_in_plane(heading, placed[:, :2]) + shift

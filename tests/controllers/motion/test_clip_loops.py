@@ -58,10 +58,10 @@ def test_drift_is_displacement_and_turn_per_lap(poses, drift):
     assert loop.duration == pytest.approx((len(poses) - 1) / 30.0)
 
 
-def _curved_walk():
+def _curved_walk(turn=0.7):
     poses = swinging(5, travel=0.0)
     s = np.linspace(0.0, 1.0, len(poses))
-    shift, angle = plane_exponential(s[:, None] * [1.2, 0.1, 0.7])
+    shift, angle = plane_exponential(s[:, None] * [1.2, 0.1, turn])
     poses[:, :2], poses[:, 3:7] = (
         rotate_in_plane(angle, poses[:, :2]) + shift,
         product(about_axis(2, angle), poses[:, 3:7]),
@@ -75,12 +75,24 @@ def test_drift_of_a_rigidly_moved_clip_is_unchanged_in_its_own_frame(heading, di
     moved, turn = poses.copy(), Rotation.from_euler("z", heading)
     moved[:, :3] = turn.apply(poses[:, :3]) + np.append(displacement, 0.0)
     moved[:, 3:7] = wxyz(turn * Rotation.from_quat(poses[:, 3:7], scalar_first=True))
-    before, after = _loop(poses).drift, _loop(moved).drift
-    assert np.hypot(*before[:2]) > 1.0
-    assert np.hypot(*after[:2]) == pytest.approx(np.hypot(*before[:2]), abs=1e-9)
-    # Each loop faces +x on average: these are directions relative to the clip's own heading.
-    assert np.arctan2(after[1], after[0]) == pytest.approx(np.arctan2(before[1], before[0]), abs=1e-9)
-    assert after[2] == pytest.approx(before[2], abs=1e-9)
+    before, after = _loop(poses), _loop(moved)
+    assert np.hypot(*before.drift[:2]) > 1.0
+    np.testing.assert_allclose(after.drift, before.drift, atol=1e-9)
+    s = np.linspace(0.0, 1.0, 50)
+    remainders = (loop.channels(s, np.zeros(50)) for loop in (before, after))
+    positions, others = zip(*((rest[:, :3], matrices(rest[:, 3:7])) for rest in remainders), strict=True)
+    np.testing.assert_allclose(*positions, atol=1e-8)
+    np.testing.assert_allclose(*others, atol=1e-8)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, -2.8, 4.5, 2.0 * np.pi, -2.0 * np.pi])
+def test_remainder_of_a_clip_that_turns_is_at_the_origin_and_faces_x(turn):
+    """Else a change from a walk ahead to a run along an arc of 2.8 m radius moves figure and feet by a metre."""
+    loop = _loop(_curved_walk(turn))
+    assert np.hypot(*loop.drift[:2]) == pytest.approx(1.2, abs=0.02)
+    rest = loop.channels(np.linspace(0.0, 1.0, 400, endpoint=False), np.zeros(400))
+    np.testing.assert_allclose(rest[:, :2].mean(axis=0), 0.0, atol=2e-3)
+    assert _mean_heading(rest) == pytest.approx(0.0, abs=2e-3)
 
 
 def test_curved_walk_has_a_periodic_remainder():
