@@ -5,13 +5,15 @@ Whatever their speed, people walk with about the same ratio of step length to ca
 
 .. math:: W = \frac{L}{l}\,T\,\sqrt{g/l}
 
-with the length L and the time T of a step. A motion in slow motion has a larger one by its factor. People also pause
-between steps: only steps at an even pace count.
+with the length L and the time T of a step. A motion in slow motion has a larger one by its factor f. People also pause
+between steps: only steps at an even pace count. They skip, with a hop in every step; but in slow motion a body falls
+with g/f² at most.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from geometry.arrays import Array
 from geometry.physics import GRAVITY
@@ -26,6 +28,9 @@ _USUAL_RATIO = 1.5  # W of walks, runs have up to 1.8
 _MAX_RATIO, _MIN_STEPS = 4.0, 3
 _MIN_ASTRIDE = 0.15  # distance between the ankles along the hips' heading from which one foot is ahead [leg lengths]
 _MIN_STEP = 0.3  # least length of a step [leg lengths]
+# Downward acceleration of the hips above which a body is not in slow motion [g], and the time over which it is a mean
+# [s]: at the least factor that is remarked on, a flight has 0.14.
+_MAX_FALL, _FALL_TIME = 0.33, 0.2
 _MIN_EVENNESS = 0.6  # least distance covered in a quarter of a step, as a fraction of the mean of its quarters
 
 
@@ -57,7 +62,9 @@ def slow_step_remarks(path: Array, legs: Array, ankles: Array, leg: float, fps: 
     times = np.diff(passing) / fps
     ratios = lengths * times / (leg * np.sqrt(leg / GRAVITY))
     even = (covered.min(axis=0) > _MIN_EVENNESS * covered.mean(axis=0)) & (lengths > _MIN_STEP * leg)
-    slow = [slice(*run) for run in spans(even & (ratios > _MAX_RATIO)) if run[1] - run[0] >= _MIN_STEPS]
+    runs = [slice(*run) for run in spans(even & (ratios > _MAX_RATIO)) if run[1] - run[0] >= _MIN_STEPS]
+    falls = _falls(path[:, 2], fps)
+    slow = [run for run in runs if falls[passing[run.start] : passing[run.stop]].max() < _MAX_FALL * GRAVITY]
     if slow:
         length, time, ratio = (
             float(np.median(np.concatenate([values[run] for run in slow]))) for values in (lengths, times, ratios)
@@ -65,3 +72,11 @@ def slow_step_remarks(path: Array, legs: Array, ankles: Array, leg: float, fps: 
         factor = ratio / _USUAL_RATIO
         remark = f"steps of {length:.2f} m take {time:.1f} s each at an even pace, {factor:.0f} times a person's time"
         yield f"{remark}: if {fps:g} frames a second are wrong, give --frame-rate, such as {two_digits(fps * factor)}"
+
+
+def _falls(heights: Array, fps: float) -> Array:
+    """Downward accelerations [m/s²], by parabolas over `_FALL_TIME` or five frames; zeros if there are fewer."""
+    width = 2 * round(max(_FALL_TIME * fps, 4.0) / 2.0) + 1
+    if len(heights) < width:
+        return np.zeros(len(heights))
+    return np.asarray(-savgol_filter(heights, width, 2, deriv=2, delta=1.0 / fps))

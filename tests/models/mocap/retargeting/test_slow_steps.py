@@ -55,6 +55,19 @@ def test_pauses_between_steps_are_not_slow_motion(ratio, evenness, named):
     assert len(list(slow_step_remarks(*stepping(ratio, evenness)))) == named
 
 
+@pytest.mark.parametrize(("slower", "named"), [(1.0, False), (4.0, True)])
+def test_skipping_is_not_slow_motion_but_skipping_in_slow_motion_is(slower, named):
+    """Two hops a step, 4 cm high: 0.45 s each, of which half in flight at a person's pace."""
+    path, *rest = stepping(6.0)
+    step_time = 6.0 * LEG * np.sqrt(LEG / GRAVITY) / 0.7
+    hop_time = slower * 0.18
+    from_top = (np.arange(len(path)) / FPS) % (2.0 * hop_time) - hop_time
+    path = path.copy()
+    path[:, 2] += 0.16 - np.minimum(0.5 * GRAVITY * (from_top / slower) ** 2, 0.16)
+    assert step_time > 2.0 * hop_time
+    assert len(list(slow_step_remarks(path, *rest))) == named
+
+
 def test_length_time_and_rate_of_the_steps_are_told():
     (line,) = slow_step_remarks(*stepping(6.0))
     assert line.startswith("steps of 0.70 m take 2.3 s each at an even pace, 4 times a person's time: ")
