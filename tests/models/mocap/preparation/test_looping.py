@@ -25,6 +25,20 @@ def test_lap_of_a_walk_is_found_and_closed(walks):
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
 
 
+def test_run_on_the_spot_whose_ends_differ_by_a_rounded_ankle_is_closed_as_a_whole():
+    """A stride at 24 frames a second: d of its ends is large, as their velocities are one-sided."""
+    lap = resampled(embedded("run"), 24.0).poses[:18]
+    lap[:, :2] = 0.0
+    lap[-1] = lap[0]
+    ankle = np.zeros((1, 57))
+    ankle[0, 6 + 3 * JOINTS.index("right_ankle")] = 0.006
+    lap[-1:] = add_tangents(lap[-1:], ankle)
+    found = close_or_rest(resampled(Clip(lap, 24.0, "run on the spot"), 120.0))
+    assert found.kind == "cycle"
+    assert found.clip.closes()
+    assert found.clip.duration == pytest.approx(17 / 24, abs=0.01)
+
+
 @pytest.fixture(scope="module")
 def turning():
     """Function of a yaw rate a frame: five and a half laps of the embedded walk, whose heading it turns on the spot."""
