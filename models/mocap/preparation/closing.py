@@ -15,7 +15,7 @@ import numpy as np
 from geometry.easing import smooth_steps
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
 from models.mocap.motion.mirror import mirrored
-from models.mocap.preparation.coming_to_rest import departing
+from models.mocap.preparation.coming_to_rest import REST_TIME, departing
 from models.mocap.preparation.poses import add_tangents, smoothed
 from models.mocap.preparation.stances import stances
 
@@ -57,19 +57,22 @@ def closed_lap(clip: Clip, first: int, last: int, half: bool = False) -> Clip:
 
 
 def with_way_back(clip: Clip) -> Clip:
-    """The clip and a way back from its last frame to its first: a quintic in the tangent, with matching velocities."""
+    r"""The clip and a way back from its last frame to its first, with matching velocities.
+
+    The tangent goes by a quintic from 0 to the difference of both poses. The velocities at its ends decay within
+    `REST_TIME`: over a longer way, the noise of a first frame would carry a body that stands far into the air.
+    """
     first, last = clip.poses[0] if _has_standing_foot(clip) else clip.displacement.moved(clip.poses[0]), clip.poses[-1]
     difference = pose_difference(last, first)
     largest = float(np.linalg.norm(difference[6:].reshape(-1, 3), axis=1).max())
     n = round((_WAY_BACK_TIMES[0] + _WAY_BACK_TIMES[1] * largest) * clip.fps)
     # At 120 Hz, 8° of noise in a first frame would be 17 rad/s.
-    speeds = smoothed(clip).velocities() / clip.fps * n
-    start, end = speeds[-1], speeds[0]
-    x = np.linspace(0.0, 1.0, n + 1)[1:, None]
-    # Quintic with the ends' values and velocities and no acceleration.
-    ease = smooth_steps(x)
-    arrive = -4.0 * x**3 + 7.0 * x**4 - 3.0 * x**5
-    way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + departing(x) * start + arrive * end)
+    velocities = smoothed(clip).velocities() * REST_TIME
+    time = np.arange(1, n + 1)[:, None] / clip.fps
+    leaving = departing(np.minimum(time / REST_TIME, 1.0)) * velocities[-1]
+    arriving = -departing(np.minimum((n / clip.fps - time) / REST_TIME, 1.0)) * velocities[0]
+    ease = smooth_steps(time * clip.fps / n)
+    way = add_tangents(np.repeat(last[None], n, axis=0), ease * difference + leaving + arriving)
     way[-1] = first
     return Clip(np.vstack((clip.poses, way)), clip.fps, clip.name)
 

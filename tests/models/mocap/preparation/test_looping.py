@@ -5,7 +5,7 @@ import pytest
 
 from geometry import quaternions
 from models.errors import ModelError
-from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS
+from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, rest_pose
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, PlanarDisplacement, pose_difference
@@ -247,6 +247,24 @@ def test_walk_that_is_cut_anywhere_begins_and_ends_standing(walks):
             assert moved.min() < 0.05
         steps = np.abs(found.velocities())
         assert max(steps[0].max(), steps[-1].max()) < 0.2
+
+
+def test_long_way_back_of_a_gesture_whose_hips_sink_at_first_stays_on_the_floor():
+    """An arm is raised by 150° in 2 s; at first the hips sink at 0.6 m/s, as where a tracker settles. With that
+    velocity over all of the way, feet would be 0.9 m high."""
+    n = 240
+    path = np.zeros((n, 57))
+    path[:, 6 + 3 * JOINTS.index("left_shoulder")] = 2.6 * np.linspace(0.0, 1.0, n) ** 2
+    sunk = 0.03 * np.exp(-np.arange(n) / 6.0)
+    path[:, 2] = sunk
+    for joint, angle in (("hip", 1.0), ("knee", -2.0), ("ankle", 1.0)):
+        for side in ("left", "right"):
+            path[:, 7 + 3 * JOINTS.index(f"{side}_{joint}")] = 4.0 * angle * sunk
+    found = close_or_rest(Clip(add_tangents(np.repeat(rest_pose()[None], n, axis=0), path), 120.0, "settling"))
+    assert found.kind == "way back"
+    assert found.clip.duration > 4.0
+    way = sole_points(found.clip.poses[n:])[..., 2] - CONTACT_RADIUS
+    assert way.min(axis=1).max() < 0.12
 
 
 def test_noise_in_the_first_frame_hardly_changes_the_transition_from_rest(walks):
