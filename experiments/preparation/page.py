@@ -65,7 +65,7 @@ def page(outcome: PreparedFile, captured: Measured) -> str:
 
 
 def filmstrip(clips: dict[str, Clip]) -> Figure:
-    """A row for every clip, seen from the side of its direction of travel, or along y if it stays in place."""
+    """A row for every clip, with its times, seen from the side of its direction of travel, or along y if in place."""
     figure = Figure(figsize=(0.9 * _PICTURE_COUNT, 1.9 * len(clips)), layout="constrained")
     for axes, (title, clip) in zip(np.atleast_1d(figure.subplots(len(clips), 1)), clips.items(), strict=True):
         _draw_row(axes, clip)
@@ -85,6 +85,7 @@ def _draw_row(axes: Axes, clip: Clip) -> None:
         mujoco.mj_kinematics(model, data)
         origin = np.append(clip.poses[frame, :2], 0.0)
         start = np.array([_PICTURE_SPACING * k, 0.0])
+        axes.text(start[0], -0.05, f"{frame / clip.fps:.1f} s", fontsize=6, ha="center", va="top")
 
         def projected(points: Array, origin: Array = origin, start: Array = start) -> Array:
             return (points - origin) @ view + start

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.preparation.page import captured_beside
+from experiments.preparation.page import captured_beside, filmstrip
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.looping import LoopedClip
@@ -31,3 +31,13 @@ def test_capture_waits_where_its_clip_comes_to_rest():
     clip = Clip(np.vstack((rest[0], cut.poses, rest[1])), FPS, "rests")
     shown = captured_beside(clip, cut, LoopedClip(clip, "open", -0.2, cut.duration, 0.0), 1.0, np.arange(149) / FPS)
     assert np.abs(pose_difference(shown, clip.poses)).max() < 1e-6
+
+
+def test_pictures_of_capture_and_clip_have_their_own_times():
+    """A clip is a part of its capture: pictures above each other are of other moments."""
+    walk = resampled(embedded("walk"), FPS)
+    half = Clip(walk.poses[: walk.n_frames // 2 + 1], FPS, "half")
+    captured, prepared = filmstrip({"as captured": walk, "prepared": half}).axes
+    for axes, clip in ((captured, walk), (prepared, half)):
+        told = [text.get_text() for text in axes.texts]
+        assert (told[0], told[-1]) == ("0.0 s", f"{clip.duration:.1f} s")
