@@ -6,6 +6,7 @@ import numpy as np
 
 from experiments.flights.ballistics import ClipBallistics
 from experiments.preparation.tracking_trial import Followed
+from geometry import quaternions
 from geometry.physics import GRAVITY
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
@@ -21,6 +22,7 @@ _MIN_OWN_FRACTION = 0.5  # fraction of the file's own motion in the clip below w
 _MIN_LEFT_OUT = 0.5  # time of the capture that its cycle lacks, from which it is reported [s]
 # Turn without which a cycle is not called the same motion [°]: 89 of 100 cycles lack at most 26°, the others 34 to 329.
 _MAX_LOST_TURN = 30.0
+_MIN_LAP_TURN = 15.0  # turn of a cycle that is told [°]: straight walks and runs drift by up to 10 in a lap
 # Acceleration in flights below which a wrong frame rate is more likely than dancers' hovering feet [m/s²]: jumps have 8
 # to 12, dancers' steps 4 to 7.
 _MAX_SLOW_FALL = 4.0
@@ -138,7 +140,10 @@ def changes(prepared: Prepared) -> tuple[str, ...]:
         "way back": "the whole motion, and back",
         "open": "the whole motion, at rest at both ends",
     }
-    lines = [f"{words[part.kind]}: {prepared.clip.duration:.2f} s"]
+    headings = np.unwrap(quaternions.heading(prepared.clip.poses[:, 3:7]))
+    turn = np.rad2deg(headings[-1] - headings[0]) if part.kind == "cycle" else 0.0
+    turning = f", turns {'left' if turn > 0.0 else 'right'} by {abs(turn):.0f}° in each lap"
+    lines = [f"{words[part.kind]}{turning if abs(turn) > _MIN_LAP_TURN else ''}: {prepared.clip.duration:.2f} s"]
     own_fraction = (part.end - max(part.start, 0.0)) / prepared.clip.duration
     if part.kind in _ADDED_MOTION and own_fraction < _MIN_OWN_FRACTION:
         what = f"of {prepared.clip.duration:.2f} s the file's motion is {part.end - max(part.start, 0.0):.2f} s"

@@ -11,7 +11,7 @@ from experiments.preparation.prepared_file import PreparedFile, changes, doubts,
 from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS
 from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.fidelity import fidelity
@@ -105,6 +105,20 @@ def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
     assert "at 1.20 s the capture has turned 90° further than its cycle ever does: --loop open keeps its turns" in lines
     less = looped._replace(lost_turn=LostTurn(0.4, 1.2))
     assert not any("has turned" in line for line in losses(result._replace(looped=less)))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "told"),
+    [(40.0, ", turns left by 40° in each lap"), (-400.0, ", turns right by 400° in each lap"), (5.0, "")],
+)
+def test_turn_of_a_cycle_is_told_with_its_side(degrees, told):
+    """Seen from above, left is the sense of rotation from x to y."""
+    made = _made(None, near=True)
+    angles = np.deg2rad(degrees) * np.linspace(0.0, 1.0, made.clip.n_frames)
+    poses = [PlanarDisplacement(0.0, 0.0, a).moved(p) for a, p in zip(angles, made.clip.poses, strict=True)]
+    turning = made._replace(clip=Clip(np.array(poses), made.clip.fps, "turning"))
+    assert changes(turning)[0] == f"cycle 0.00 to 2.20 s, whose ends were 0.0° apart{told}: 2.20 s"
+    assert ", turns" not in changes(turning._replace(looped=made.looped._replace(kind="open")))[0]
 
 
 @pytest.mark.parametrize("near", [True, False])
