@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import ClassVar, Self
+from functools import lru_cache
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from controllers.blending.blend import packed_blend
-from controllers.blending.clip_arrays import stored_array
+from controllers.blending.clip_arrays import clip_arrays, stored_array
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap
@@ -51,9 +51,57 @@ class ClipMap(KernelMap):
         """Duration of a lap at which the clips run on average at their own pace [s]."""
         return float(np.mean([(len(poses) - 1) / fps for poses, fps in self.clips]))
 
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap.of(self.map_kernel, self._params, fresh_lap())
+    def fresh_memory(self) -> Array:
+        """The memory of a new run: the frame of its first lap."""
+        return fresh_lap()
+
+
+def _numbered(clips: Sequence[tuple[Array, float]]) -> list[str]:
+    return [str(i) for i in range(len(clips))]
+
+
+class _Ingredients:
+    """All that a blend is made of, equal to others of the same numbers."""
+
+    def __init__(
+        self, clips: Sequence[tuple[Array, float]], second_group: tuple[int, ...], limbs: Sequence[Limb],
+        lap: float | None, apart: bool,
+    ) -> None:  # fmt: skip
+        self.clips, self.second_group, self.limbs, self.lap, self.apart = clips, second_group, limbs, lap, apart
+        arrays = clip_arrays(clips, _numbered(clips), limbs).items()
+        self._numbers = second_group, lap, apart, tuple((key, array.shape, array.tobytes()) for key, array in arrays)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Ingredients) and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        return hash(self._numbers)
+
+
+class _Blended(NamedTuple):
+    """Clips as loops, limbs with limits that include all poses, and parameters of `blend`."""
+
+    loops: list[Loop]
+    limbs: list[Limb]
+    params: Array
+
+
+@lru_cache(maxsize=8)  # the runs of a sweep, a study or a live page blend the same clips
+def _blended(of: _Ingredients) -> _Blended:
+    poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(of.clips)]
+    if len({clip.shape[1] for clip in poses}) != 1:
+        raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
+    loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, of.clips, strict=True)]
+    loops = fit_to_lap(loops, of.lap, of.apart)
+    limbs = [limb.with_limits_for(poses) for limb in of.limbs]
+    groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
+    for joint in of.second_group:
+        if not 1 <= joint < len(groups):
+            raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group needs {joint}")
+        groups[joint] = 1
+    frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in loops)
+    samples = int(np.clip(np.ceil(frames), 64, 2048))
+    return _Blended(loops, limbs, packed_blend(loops, samples, groups, limbs))
 
 
 class AnimationMap(ClipMap):
@@ -99,22 +147,10 @@ class AnimationMap(ClipMap):
         lap: float | None = None,
         apart: bool = False,
     ) -> None:
-        poses = [checked_clip(clip, fps, f"clip {i}") for i, (clip, fps) in enumerate(clips)]
-        if len({clip.shape[1] for clip in poses}) != 1:
-            raise ParameterError(f"all clips must have poses of the same size, got {[clip.shape[1] for clip in poses]}")
-        loops = [closed_loop(clip, fps) for clip, (_, fps) in zip(poses, clips, strict=True)]
-        self.loops: list[Loop] = fit_to_lap(loops, lap, apart)
         self.lap, self.second_group = lap, tuple(second_group)
-        limbs = [limb.with_limits_for(poses) for limb in limbs]
-        groups = np.zeros((poses[0].shape[1] - 3) // 4, dtype=np.int64)
-        for joint in second_group:
-            if not 1 <= joint < len(groups):
-                raise ParameterError(f"the poses have joints 1 to {len(groups) - 1}, a group needs {joint}")
-            groups[joint] = 1
-        frames = max(loop.share * (len(loop.splines[0].x) - 1) for loop in self.loops)
-        samples = int(np.clip(np.ceil(frames), 64, 2048))
-        params = np.concatenate([numbers, packed_blend(self.loops, samples, groups, limbs)])
-        super().__init__(params, clips, [str(i) for i in range(len(clips))], limbs)
+        blended = _blended(_Ingredients(clips, self.second_group, limbs, lap, apart))
+        self.loops: list[Loop] = list(blended.loops)
+        super().__init__(np.concatenate([numbers, blended.params]), clips, _numbered(clips), blended.limbs)
 
     @property
     def laps(self) -> int:

@@ -162,8 +162,12 @@ class KernelMap(HapticMap):
         return own_map.N_FIGURE_POSE
 
     def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel; by default it has no memory."""
-        return CompiledMap.of(self.map_kernel, self._params, np.zeros(0))
+        """The map in the form of its kernel, with the memory of a new run."""
+        return CompiledMap.of(self.map_kernel, self._params, self.fresh_memory())
+
+    def fresh_memory(self) -> Array:
+        """The memory of a new run; by default there is none."""
+        return np.zeros(0)
 
     def pose(self, x: Array, memory: Array | None = None) -> Pose:
         """Configuration h(x), shape (nq,), of a stylus pose (7,), in the first lap or that of the memory (updated)."""
@@ -178,7 +182,7 @@ class KernelMap(HapticMap):
         if stylus.shape != (STYLUS,):
             raise ParameterError(f"a stylus pose has shape ({STYLUS},), got {stylus.shape}")
         pose, jacobian = np.empty(self.nq), np.empty((rows, STYLUS_TANGENT))
-        self.map_kernel(self._params, stylus, self.compiled().memory if memory is None else memory, pose, jacobian)
+        self.map_kernel(self._params, stylus, self.fresh_memory() if memory is None else memory, pose, jacobian)
         return pose, jacobian
 
 

@@ -13,7 +13,6 @@ from controllers.blending.combination import Mixture
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -172,12 +171,11 @@ class Cylindrical(AnimationMap):
         if limbs:
             self._set_corrections(self._compute_corrections(limbs) if corrections is None else corrections)
 
-    def compiled(self) -> CompiledMap:
-        """As in `ClipMap`; where legs are blended, the memory has a footing."""
-        compiled = super().compiled()
+    def fresh_memory(self) -> Array:
+        """As in `ClipMap`, and a footing where legs are blended."""
         if self.upper or not self.limbs:
-            return compiled
-        return compiled._replace(memory=np.concatenate([compiled.memory, fresh_footing(len(self.limbs))]))
+            return super().fresh_memory()
+        return np.concatenate([super().fresh_memory(), fresh_footing(len(self.limbs))])
 
     def _compute_corrections(self, limbs: Sequence[Limb]) -> Array:
         if self.upper:

@@ -21,7 +21,6 @@ from numba import njit
 from controllers.curves.splines import control_points, interpolate
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.cyclic_runs import runs
 from controllers.legs.grounded import grounded, max_swing_speed_ratio, stepping
 from controllers.legs.limb_ends import with_ends
@@ -291,6 +290,6 @@ class Led(KernelMap):
         """Numbers of a configuration."""
         return 3 + 4 * self._rotations
 
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with a straight path along x, 30 m to both sides of the origin."""
-        return CompiledMap.of(self.map_kernel, self._params, straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP))
+    def fresh_memory(self) -> Array:
+        """The memory of a new run: a straight path along x, 30 m to both sides of the origin."""
+        return straight_path(0.0, 0.0, 0.0, 0.5 * ROWS * STEP)

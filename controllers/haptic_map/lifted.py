@@ -6,7 +6,6 @@ from copy import copy
 import numpy as np
 
 from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs, stored_names
-from controllers.blending.combination import fresh_lap
 from controllers.curves.splines import periodic_interpolation
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
@@ -15,7 +14,6 @@ from controllers.haptic_map.lifted_kernel import clip_weights, lifted_map, packe
 from controllers.haptic_map.lifting.frames import PlacedClip, checked_angles, closing_gap
 from controllers.haptic_map.lifting.sites import checked_sites
 from controllers.haptic_map.lifting.transitions import MapTransition, checked_transitions, transition_rows
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.legs.limbs import Limb
 from controllers.legs.stance_hold import fresh_footing
 from controllers.motion.loops import MAX_CLOSURE_GAP, checked_clip
@@ -115,11 +113,9 @@ class Lifted(ClipMap):
         params = packed_lifted(self._placed_clips, self.sites, self.margin, limbs)
         super().__init__(params, clips, names, limbs)
 
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run."""
-        return CompiledMap.of(
-            self.map_kernel, self._params, np.concatenate([fresh_lap(), fresh_footing(len(self.limbs))])
-        )
+    def fresh_memory(self) -> Array:
+        """As in `ClipMap`, and a footing."""
+        return np.concatenate([super().fresh_memory(), fresh_footing(len(self.limbs))])
 
     @property
     def closed(self) -> tuple[bool, ...]:

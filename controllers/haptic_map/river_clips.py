@@ -7,12 +7,10 @@ import numpy as np
 from numba import njit
 
 from controllers.blending.blend import blend
-from controllers.blending.combination import fresh_lap
 from controllers.curves.trajectory import START, Trajectory, curve_acceleration, curve_point, curve_velocity
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.haptic_map.clip_change import ClipChange, add_change, packed_changes, transition_duration
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.river_memory import (
     ACTIVE_RIVER,
     BLEND,
@@ -216,7 +214,7 @@ class RiverClips(AnimationMap):
         self._params = np.concatenate([self._header(), self._params[int(self._params[BLEND]) :]])
         return self
 
-    def compiled(self) -> CompiledMap:
-        """The map in the form of its kernel, with the memory of a new run: the first river is active."""
+    def fresh_memory(self) -> Array:
+        """As in `ClipMap`, and the change of clips: the first river is active."""
         memory = [0.0, np.nan, 0.0, 0.0, 0.0, 0.0, np.nan, -1.0, 0.0, np.nan]
-        return CompiledMap.of(self.map_kernel, self._params, np.concatenate([fresh_lap(), memory]))
+        return np.concatenate([super().fresh_memory(), memory])

@@ -55,6 +55,21 @@ def _at(corner, s):
     return r, 2.0 * np.pi * s, z
 
 
+def test_maps_of_the_same_clips_are_equal_and_share_no_numbers():
+    def made(legs_of=1, lap=2.0, clips=CLIPS):
+        return Cylindrical(clips, R, Z, [LEG], lap=lap, upper=(3,), legs_of=legs_of)
+
+    first, x = made(), stylus(0.05, 2.0, 0.004)
+    pose = first.pose(x)
+    first._params[:] = np.nan
+    first.loops.clear()
+    np.testing.assert_array_equal(made().pose(x), pose)
+    faster = [(CLIPS[0][0], 31.0), *CLIPS[1:]]
+    moved = [(CLIPS[0][0] + 1e-9 * (np.arange(CLIPS[0][0].shape[1]) == 2), 30.0), *CLIPS[1:]]
+    for other in (made(lap=9.0), made(clips=faster), made(clips=moved), made(legs_of=2)):
+        assert not np.array_equal(other._params, made()._params)
+
+
 def test_blend_of_a_clip_with_itself_is_the_clip_everywhere():
     same = Cylindrical([CLIPS[0]] * 4, R, Z)
     for r, z in ((0.03, -0.03), (0.05, 0.0), (0.06, 0.02), (0.2, 0.5), (0.001, -0.5)):
