@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from functools import cache
 
 import numpy as np
 from numba import njit
@@ -67,6 +68,7 @@ def cylindrical_map(params: Array, x: Array, memory: Array, pose: Array, jacobia
     blend_corrected(params[_TABLE + size :], angle, Mixture(weights, changes, chain, d), memory, pose, jacobian)
 
 
+@cache
 def _mixtures() -> tuple[Array, Array]:
     """The table's nodes (k, 2), as shares of r and z, and the weights of the clips there (k, 4)."""
     ease, share = eased_weight.py_func, np.linspace(0.0, 1.0, 4001)  # in Python, since compiling would take longer
@@ -80,6 +82,12 @@ def _mixtures() -> tuple[Array, Array]:
 def correction_shape(limbs: int) -> tuple[int, int]:
     """Shape of a map's corrections at one phase: number of mixtures, and of channels for this number of limbs."""
     return _NODES**2, ROOT + FOOT * limbs
+
+
+@cache
+def _table_of_zeros(shape: tuple[int, ...]) -> Array:
+    """Table of maps with legs of one clip, which need no corrections."""
+    return packed_table(np.zeros(shape))
 
 
 class Cylindrical(AnimationMap):
@@ -165,7 +173,7 @@ class Cylindrical(AnimationMap):
         super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
         self._intervals = numbers
-        self._nodes, self.mixtures = _mixtures()
+        self._nodes, self.mixtures = (values.copy() for values in _mixtures())
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
         self.corrections: Array = np.empty((0, len(self.mixtures), ROOT))
         if limbs:
@@ -185,7 +193,8 @@ class Cylindrical(AnimationMap):
         return foot_corrections(channels, self.drifts, limbs, self.mixtures)
 
     def _set_corrections(self, values: Array) -> None:
-        table = packed_table(values.reshape(len(values), _NODES, _NODES, -1))
+        values_at = values.reshape(len(values), _NODES, _NODES, -1)
+        table = packed_table(values_at) if values.any() else _table_of_zeros(values_at.shape)
         blend = self._params[_TABLE + int(self._params[_TABLE_SIZE]) :]
         self._params = np.concatenate([self._params[:_TABLE_SIZE], [len(table)], table, blend])
         self.corrections = values
