@@ -13,6 +13,9 @@ ROOT = Path(__file__).resolve().parents[2]
 WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
 
 
+pytestmark = pytest.mark.usefixtures("without_page")
+
+
 def _json(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> Any:
     assert main([*arguments, "--json"]) == 0
     return json.loads(capsys.readouterr().out)

@@ -42,6 +42,7 @@ def test_study_refuses_a_folder_with_other_results(tmp_path: Path) -> None:
     assert not (tmp_path / "study.sqlite").exists()
 
 
+@pytest.mark.usefixtures("without_page")
 def test_concurrent_run_into_one_folder_is_refused(run_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     descriptor = os.open(run_folder, os.O_RDONLY)
     try:

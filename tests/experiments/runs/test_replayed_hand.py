@@ -130,6 +130,7 @@ def test_refused_replay_creates_no_folder(recorded: hvf.Run, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_page")
 def test_replay_is_reproduced_only_while_its_recording_is_unchanged(recorded: hvf.Run, tmp_path: Path) -> None:
     hand, out = tmp_path / "hand", tmp_path / "out"
     hand.mkdir()
