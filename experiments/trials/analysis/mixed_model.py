@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 CONFIDENCE_LEVEL = 0.95
-_OPTIMISERS = ["bfgs", "lbfgs", "cg", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
+_OPTIMISERS = ["bfgs", "lbfgs", "powell"]  # tried in turn; Powell needs no gradient where a variance is zero
 
 
 class Fit(NamedTuple):
