@@ -69,9 +69,9 @@ _RIVER, _PHASE, _DISTANCE, _SCORE, _WINDOW, _CANDIDATE_SIZE = range(6)
 # Memory: [active river, its phase [s], time of the last evaluation [s], low-passed velocity (3) [m/s], time [s] at
 # which the active river took the hand, and the hand's pace there].
 _ACTIVE, _ACTIVE_PHASE, _LAST_TIME, _FILTERED_VELOCITY, _TAKEN_TIME, _TAKEN_PACE = 0, 1, 2, 3, 6, 7
-# A hand that is taken this near to a river's pace has it: encoders make 10 mm/s of noise, and curves are gone along at
-# 100 to 150. A captured jog that began 5 % too fast for that reason fell after 1.3 s.
-_PACE_NOISE = 0.1
+# A hand that is taken this near to a river's speed has its pace, by a share or [m/s]: encoders make 10 mm/s of noise,
+# and curves are gone along at 60 to 150. Captured jogs that began 5 and 15 % too fast for that reason fell at 1.3 s.
+_PACE_SHARE, _SPEED_NOISE = 0.1, 0.015
 _NO_MEMORY = (-1.0, 0.0, np.nan, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -257,7 +257,7 @@ def _eased_pace(params: Array, at: int, row: Array, taken: bool, memory: Array, 
         for i in range(3):
             v[i] = share * memory[slot + _FILTERED_VELOCITY + i]
         s, speed = _nearest_admissible(params, river, speeds, curve, row[_PHASE], v)
-        own = abs(s / speed - 1.0) < _PACE_NOISE
+        own = abs(s - speed) < max(_PACE_SHARE * speed, _SPEED_NOISE)
         memory[slot + _TAKEN_TIME], memory[slot + _TAKEN_PACE] = t, 1.0 if own else s / speed
     share = smooth_step((t - memory[slot + _TAKEN_TIME]) / ease)
     return share + (1.0 - share) * memory[slot + _TAKEN_PACE]
@@ -327,8 +327,8 @@ class HigherOrder(Law):
 
     A river may bring a hand of another pace to its own gradually: in the discrete form its current along the curve is
     s φ̇_i, and s goes from the pace of the hand when it was taken, within T_e, to 1. The pace is that of the nearest
-    point, so a hand beside a bend keeps its angular speed, clamped to the admissible speeds over |φ̇_i|, and 1 if it is
-    within 10 % of it:
+    point, so a hand beside a bend keeps its angular speed, clamped to the admissible speeds over |φ̇_i|, and 1 if the
+    hand is within 10 % or 15 mm/s of the river's speed:
 
     .. math:: s_0 = \frac{v \cdot \dot\varphi_i}{|\dot\varphi_i|^2 + (\varphi_i - p) \cdot \ddot\varphi_i}
 

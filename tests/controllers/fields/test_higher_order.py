@@ -180,6 +180,16 @@ def test_river_brings_a_hand_to_its_own_pace_within_the_ease_time():
         np.testing.assert_allclose(forces[:, 0], river.drag * (current - pace) * SPEED, atol=1e-9)
 
 
+@pytest.mark.parametrize(("noise", "share"), [(0.014, 1.0), (-0.014, 1.0), (0.016, 1.0 + 0.016 / 0.06)])
+def test_slow_river_takes_the_noise_of_encoders_for_no_pace(noise, share):
+    river = straight_river(0.0)
+    slow = Trajectory(np.asarray(river.curve.times) * SPEED / 0.06, river.curve.positions)
+    river = replace(river, curve=slow, speeds=[[0.02, 0.2]] * 2)
+    program = HigherOrder(_bundle(river), *SCALE, "discrete", ease=0.4).program()
+    (force,), _ = _run(program, [HandState.at(slow.point(0.8), [0.06 + noise, 0.0, 0.0])])
+    assert force[0] == pytest.approx(river.drag * (share * 0.06 - 0.06 - noise), abs=1e-9)
+
+
 @pytest.mark.parametrize("inside", [-0.004, 0.004])
 def test_hand_beside_a_bend_keeps_the_pace_of_its_phase_when_it_is_taken(inside):
     # Beside a circle a hand of the river's angular speed is slower or faster than the river, but its phase is not.
