@@ -13,7 +13,6 @@ with g/f² at most.
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from geometry.arrays import Array
 from geometry.physics import GRAVITY
@@ -63,7 +62,7 @@ def slow_step_remarks(path: Array, legs: Array, ankles: Array, leg: float, fps: 
     ratios = lengths * times / (leg * np.sqrt(leg / GRAVITY))
     even = (covered.min(axis=0) > _MIN_EVENNESS * covered.mean(axis=0)) & (lengths > _MIN_STEP * leg)
     runs = [slice(*run) for run in spans(even & (ratios > _MAX_RATIO)) if run[1] - run[0] >= _MIN_STEPS]
-    falls = _falls(path[:, 2], fps)
+    falls = _falls(path[:, 2], fps) if runs else np.zeros(0)
     slow = [run for run in runs if falls[passing[run.start] : passing[run.stop]].max() < _MAX_FALL * GRAVITY]
     if slow:
         length, time, ratio = (
@@ -76,6 +75,8 @@ def slow_step_remarks(path: Array, legs: Array, ankles: Array, leg: float, fps: 
 
 def _falls(heights: Array, fps: float) -> Array:
     """Downward accelerations [m/s²], by parabolas over `_FALL_TIME` or five frames; zeros if there are fewer."""
+    from scipy.signal import savgol_filter  # imported late: it loads scipy.stats, which is slow
+
     width = 2 * round(max(_FALL_TIME * fps, 4.0) / 2.0) + 1
     if len(heights) < width:
         return np.zeros(len(heights))
