@@ -263,7 +263,7 @@ def append_reversal(poses: Array, fps: float) -> Array:
 
 def closed_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip; an open clip that nearly rests at both ends is played there and back (`append_reversal`)."""
-    return _closed_loop(poses.tobytes(), poses.shape[1], fps)
+    return _closed_loop(np.asarray(poses, dtype=np.float64).tobytes(), poses.shape[1], fps)
 
 
 @lru_cache(maxsize=16)  # the runs of a sweep, a study or a live page close the same clips
