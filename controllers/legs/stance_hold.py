@@ -3,17 +3,23 @@ r"""Run-time removal of foot skate: feet in stance keep their place on the floor
 The corrections of a mixture (`pair_corrections`) hold a foot only while the mixture is constant. The foot would slide
 when the hand changes the mixture, and with it the foot's mean position, or between the mixtures that were corrected. So
 each end has an offset o over the ground, and one ψ of its heading, stored in the memory. They cancel a fraction σ of
-the slip Δp of the end's touching points and of its turning. They fade as the end swings through the air, and where a
-clip is alone:
+the slip Δp of the end's touching points and of its turning. They fade as the end swings through the air, and, slowly,
+where a clip has been alone for long:
 
 .. math:: o \leftarrow o - \sigma\,\Delta p, \qquad
-          \sigma = \sigma_0(h)\,\mu(w)\,\bigl(1 - o^2/o_{max}^2 - \psi^2/\psi_{max}^2\bigr)_+, \qquad
-          \frac{do}{d\theta} = -\bigl(\kappa\,(1 - \sigma_0) + \kappa_1 (1 - \mu)\bigr)\, o .
+          \sigma = \sigma_0(h)\,m\,\bigl(1 - o^2/o_{max}^2 - \psi^2/\psi_{max}^2\bigr)_+, \qquad
+          \frac{do}{d\theta} = -\bigl(\kappa\,(1 - \sigma_0) + \kappa_1 (1 - m)\bigr)\, o .
 
-The degree of stance σ₀ falls with the height h of the sole; μ is 0 where a clip is alone: a clip keeps its own foot
-skate, so that h∘α̃ = α. σ and σ₀ are means over the step. While a hand moves back a little, the offset grows again,
-until the direction counts as reversed; so velocity and acceleration of the figure may be computed by one-sided
-differences. h_* is the derivative at a given offset.
+The degree of stance σ₀ falls with the height h of the sole. The mixing degree μ is 0 where a clip is alone: a clip
+keeps its own foot skate, so that h∘α̃ = α. m is the largest μ of this stance: a foot that landed in a mixture stands
+until it is lifted, though a clip may be alone by then,
+
+.. math:: m \leftarrow \max(\mu, m), \qquad
+          \frac{dm}{d\theta} = -\bigl(\kappa\,(1 - \sigma_0) + \kappa_1 (1 - \mu)\bigr)\, m .
+
+σ and σ₀ are means over the step. While a hand moves back a little, the offset grows again, until the direction counts
+as reversed; so velocity and acceleration of the figure may be computed by one-sided differences. h_* is the derivative
+at a given offset.
 """
 
 from collections.abc import Sequence
@@ -34,19 +40,20 @@ from geometry.vectors import Quaternion
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
 # 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.
 _RELEASE_HEIGHT = 0.006
-# Σ w² above which μ falls, and where it is 0: for two clips, weights 0.72 and 0.985
-_MIXED_SQUARES, _ALONE_SQUARES = 0.6, 0.97
-# κ [1/rad], and the additional rate where a clip is alone. In the example at `_MAX_OFFSET` the slide stays 0.3 cm with
-# half or twice κ.
-_FADE_RATE, _ALONE_FADE_RATE = 5.0, 1.0
+# |1 − Σ w²| up to which μ is 0, and from which it is 1: for two clips, weights 0.999 and 0.947. A foot is to be held
+# from the beginning of a change on: with weights 0.985 and 0.72 feet slide 7.4 cm in changes from walk to jog, and
+# 5.2 cm with these (with `_MAX_OFFSET` 0.15).
+_ALONE, _MIXED = 0.002, 0.1
+# κ and κ₁ [1/rad]. In the example at `_MAX_OFFSET` the slide stays 0.3 cm with half or twice κ.
+_FADE_RATE, _ALONE_FADE_RATE = 5.0, 0.2
 # [m], [rad] largest offset. For a hand that visits walk, run, jump and angry once a lap, feet slide 5.8 cm without
 # footing and 0.3 cm with it; 0.9 cm with half the first number and 0.2 cm with twice.
-_MAX_OFFSET, _MAX_TURN = 0.15, 0.8
+_MAX_OFFSET, _MAX_TURN = 0.3, 0.8
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
 _REVERSAL_ANGLE = 0.15  # [rad] backward motion after which the hand's direction counts as reversed
 _MAX_ANGLE_STEP = 1.0  # [rad] larger than any change of the hand's angle in one tick
 _DIRECTION, _BACKTRACK, _ANGLE, _ENDS = range(4)
-_OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _END_SIZE = 0, 3, 5, 9, 10, 11  # of each end
+_OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _MIXING, _END_SIZE = 0, 3, 5, 9, 10, 11, 12  # of each end
 
 
 def fresh_footing(limbs: int) -> Array:
@@ -96,7 +103,7 @@ def mixing_degree(weights: Array) -> float:
     square = 0.0
     for w in weights:
         square += w * w
-    return _step_down(square, _MIXED_SQUARES, _ALONE_SQUARES)
+    return smooth_step((abs(1.0 - square) - _ALONE) / (_MIXED - _ALONE))
 
 
 @njit
@@ -151,7 +158,10 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
     stance = _step_down(end[2] + low - ground, STANCE_HEIGHT, _RELEASE_HEIGHT)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MAX_OFFSET**2 + (state[_OFFSET + 2] / _MAX_TURN) ** 2
-    hold = stance * mixture * max(1.0 - size, 0.0)
+    lifted = 1.0 - 0.5 * (stance + state[_STANCE])
+    mixing = state[_MIXING] * np.exp(-(_FADE_RATE * lifted + _ALONE_FADE_RATE * (1.0 - mixture)) * ahead)
+    mixing = min(max(mixture, mixing), 1.0)
+    hold = stance * mixing * max(1.0 - size, 0.0)
     known = state[_TURN] != 0.0 or state[_TURN + 1] != 0.0 or state[_TURN + 2] != 0.0 or state[_TURN + 3] != 0.0
     if known and abs(ahead) < _MAX_ANGLE_STEP:
         # Mean of the degree of stance before and after the step, so that steps forwards and back cancel.
@@ -172,8 +182,7 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
         state[_OFFSET] -= share * (cosine * moved_x + sine * moved_y)
         state[_OFFSET + 1] -= share * (cosine * moved_y - sine * moved_x)
         state[_OFFSET + 2] += back
-        fade = _FADE_RATE * (1.0 - 0.5 * (stance + state[_STANCE])) + _ALONE_FADE_RATE * (1.0 - mixture)
-        left = np.exp(-fade * ahead)
+        left = np.exp(-(_FADE_RATE * lifted + _ALONE_FADE_RATE * (1.0 - mixing)) * ahead)
         for i in range(3):
             state[_OFFSET + i] *= left
     elif known:
@@ -189,4 +198,4 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
     state[_POSITION] = frame[0] + cosine * end[0] - sine * end[1]
     state[_POSITION + 1] = frame[1] + sine * end[0] + cosine * end[1]
     state[_TURN], state[_TURN + 1], state[_TURN + 2], state[_TURN + 3] = _yaw(frame[2], q)
-    state[_HOLD], state[_STANCE] = hold, stance
+    state[_HOLD], state[_STANCE], state[_MIXING] = hold, stance, mixing

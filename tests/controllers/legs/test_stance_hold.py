@@ -22,11 +22,12 @@ def corrected(path, mixture=1.0, frame=(0.0, 0.0, 0.0), angles=None):
     """
     footing, offsets, points = fresh_footing(1), [], []
     angles = 0.01 * np.arange(len(path)) if angles is None else angles
-    for (x, y, z, heading, roll), angle in zip(path, angles, strict=True):
+    mixtures = np.broadcast_to(mixture, len(path))
+    for (x, y, z, heading, roll), angle, mixed in zip(path, angles, mixtures, strict=True):
         turn = Rotation.from_euler("zx", [heading, roll])
         end, q = np.array([x, y, z - turn.apply(SOLE)[:, 2].min()]), wxyz(turn)
         hold_stance_foot(
-            footing, 0, advance_hand(footing, np.mod(angle, TURN)), mixture, SOLE, 0.0, np.array(frame), end, q
+            footing, 0, advance_hand(footing, np.mod(angle, TURN)), mixed, SOLE, 0.0, np.array(frame), end, q
         )
         offsets.append(footing[3:6].copy())
         points.append(end + SOLE @ matrices(q).T)
@@ -69,9 +70,22 @@ def test_single_clip_and_airborne_foot_are_unchanged():
 
 
 def test_mixed_is_zero_for_one_dominant_weight():
-    assert mixing_degree(np.array([1.0, 0.0, 0.0])) == mixing_degree(np.array([0.99, 0.01])) == 0.0
-    assert mixing_degree(np.array([0.5, 0.5])) == mixing_degree(np.array([0.7, 0.3])) == 1.0
-    assert 0.0 < mixing_degree(np.array([0.9, 0.1])) < 1.0
+    assert mixing_degree(np.array([1.0, 0.0, 0.0])) == mixing_degree(np.array([0.9995, 0.0005])) == 0.0
+    assert mixing_degree(np.array([0.5, 0.5])) == mixing_degree(np.array([0.9, 0.1])) == 1.0
+    assert 0.0 < mixing_degree(np.array([0.97, 0.03])) < 1.0
+    # Beyond a clip the other one has a negative weight: that is no clip alone either.
+    assert mixing_degree(np.array([1.1, -0.1])) == 1.0
+
+
+def test_foot_that_landed_in_a_mixture_stays_until_it_is_lifted_though_a_clip_is_alone_by_then():
+    """The mixture ends half way through a stance; then the foot swings for half a lap, and stands in the next stance."""
+    stance, swing = path(100, x=0.1 * np.linspace(0.0, 1.0, 100)), path(300, x=0.1, z=0.03)
+    mixture = np.concatenate([np.linspace(1.0, 0.0, 50), np.zeros(450)])
+    offsets, points = corrected(np.concatenate([stance, swing, stance]), mixture)
+    assert np.abs(points[:100] - points[0]).max() < 0.015
+    assert np.linalg.norm(offsets[399]) < 1e-6
+    # In the next stance the clip alone moves its foot by 10 cm, as it does without a footing.
+    assert points[499, 0, 0] - points[400, 0, 0] > 0.099
 
 
 def test_held_offset_decays_in_the_air_and_is_restored_on_the_way_back():
