@@ -16,7 +16,7 @@ from numba import njit
 from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
-from controllers.legs.stance_hold import advance_hand, hold_stance_foot
+from controllers.legs.stance_hold import advance_hand, carry_root, hold_stance_foot
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap
 from controllers.motion.mean import mean_derivative, mean_rotation, signed_mean, signed_mean_derivative
@@ -105,6 +105,14 @@ def _turn_rotation(angle: float, turn: Array, q: Array, rate: Array) -> None:
         rate[1, k] += turn[k] * up_y
         rate[2, k] += turn[k] * up_z
     q[0], q[1], q[2], q[3] = multiply(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle), q[0], q[1], q[2], q[3])
+
+
+@njit
+def _move_lap(memory: Array, heading: float, shift: tuple[float, float]) -> None:
+    """Move the frame of the lap over the ground by a vector that is given at a heading."""
+    c, s = np.cos(heading), np.sin(heading)
+    memory[LAP_X] += c * shift[0] - s * shift[1]
+    memory[LAP_Y] += s * shift[0] + c * shift[1]
 
 
 @njit
@@ -234,23 +242,24 @@ def _combine_borrowed(
     s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
     frame, ahead = work_array(3), 0.0
     if footing.shape[0] > 0:
+        ahead = advance_hand(footing, angle)
+        frame[2] = s * drift[0, 2] + lap
+        _move_lap(memory, frame[2], carry_root(footing, limbs, ahead))
         x, y = drift_motion(drift, s, 1.0, shift, turn)
         frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
         frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
-        frame[2] = s * drift[0, 2] + lap
-        ahead = advance_hand(footing, angle)
 
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
-    root, end = work_array((4, 3)), work_array((4, 3))
+    root, ends = work_array((4, 3)), work_array((limbs, 4, 3))
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if corrected:
         for k in range(4):
             root[k, 0] += correction[k, 0]
             root[k, 1] += correction[k, 1]
     for n in range(limbs):
-        limb = packed[LIMB_SIZE * n : LIMB_SIZE * (n + 1)]
-        last, column = int(limb[LAST]), 3 + 4 * rotations + N_END_CHANNELS * n
+        last, end = int(packed[LIMB_SIZE * n + LAST]), ends[n]
+        column = 3 + 4 * rotations + N_END_CHANNELS * n
         _mean_position(value, slope, column, weights[0], changes[0], end)
         heading = 0.0
         if corrected:
@@ -267,7 +276,13 @@ def _combine_borrowed(
             keep_above(floor, soles[n], end, q[last], rates[last], tangents)
         if footing.shape[0] > 0:
             hold_stance_foot(footing, n, ahead, mixing, soles[n], contact, frame, end[0], q[last])
-        solve_limb(limb, q, rates, root, end, tangents)
+    if footing.shape[0] > 0:
+        x, y = carry_root(footing, limbs, ahead)
+        _move_lap(memory, frame[2], (x, y))
+        ends[:, 0, 0] -= x
+        ends[:, 0, 1] -= y
+    for n in range(limbs):
+        solve_limb(packed[LIMB_SIZE * n : LIMB_SIZE * (n + 1)], q, rates, root, ends[n], tangents)
 
     x, y = drift_motion(drift, s, 1.0, shift, turn)
     _turn_position(s * drift[0, 2], turn, x, y, shift, root)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controllers.haptic_map.lifted import Lifted
-from controllers.legs.stance_hold import advance_hand, fresh_footing, hold_stance_foot, mixing_degree
+from controllers.legs.stance_hold import advance_hand, carry_root, fresh_footing, hold_stance_foot, mixing_degree
 from controllers.motion.lap import MEMORY
 from tests.controllers.clips_for_maps import LEG, difference, matrices, numeric_jacobian, stylus, swinging, wxyz
 from tests.controllers.haptic_map.test_lifted_map import ring
@@ -137,6 +137,23 @@ def test_differences_from_one_memory_converge_to_velocity_and_acceleration():
     for a, b in zip(coarse, fine, strict=True):
         assert np.abs(b).max() > 0.01
         np.testing.assert_allclose(a, b, atol=0.02 * np.abs(b).max())
+
+
+def test_root_follows_its_standing_feet_and_a_step_back_undoes_it():
+    footing = fresh_footing(2)
+    states = footing[3:].reshape(2, -1)
+    states[0, :2], states[0, 10] = (0.1, -0.02), 1.0  # stands
+    states[1, :2], states[1, 10] = (-0.3, 0.5), 0.0  # swings
+    before = states[:, :2].copy()
+    shift = np.array(carry_root(footing, 2, 0.2))
+    # Half of a relaxation of the standing foot's offset with 0.5 a radian; the swinging foot's place stays, too.
+    np.testing.assert_allclose(shift, before[0] * (1.0 - np.exp(-0.05)), rtol=1e-12)
+    np.testing.assert_allclose(states[:, :2] + shift, before, rtol=1e-12)
+    np.testing.assert_allclose(shift + carry_root(footing, 2, -0.2), 0.0, atol=1e-15)
+    np.testing.assert_allclose(states[:, :2], before, rtol=1e-12)
+    # Of two standing feet the mean counts.
+    states[1, 10] = 1.0
+    np.testing.assert_allclose(carry_root(footing, 2, 0.2), before.mean(axis=0) * (1.0 - np.exp(-0.05)), rtol=1e-12)
 
 
 CLIPS = [(swinging(k, 120, travel=0.4 * k), 30.0) for k in (1, 2, 3)]
