@@ -191,6 +191,48 @@ class Ground(NamedTuple):
 
 
 @njit
+def _mean_end(
+    clips: ClipsAt, drift: Array, mixture: Mixture, n: int, column: int, end: Array, q: Array, rates: Array
+) -> None:  # fmt: skip
+    """Mean place and orientation of the end of limb n in the frame of the drift, from its channels at a column."""
+    value, slope, correction, heading = clips.value, clips.slope, mixture.correction, 0.0
+    _mean_position(value, slope, column, mixture.weights[0], mixture.changes[0], end)
+    corrected, at = correction.shape[1] > 0, ROOT + FOOT * n
+    if corrected:
+        end += correction[:, at : at + 3]
+        heading = correction[0, at + 3]
+    lag, shift, turn = value[0, column + 3], work_array((2, 3)), work_array(3)
+    x, y = drift_motion(drift, lag, 2.0 * np.pi * slope[0, column + 3], shift, turn)
+    _turn_position(lag * drift[0, 2], turn, x, y, shift, end)
+    if corrected:
+        turn += correction[1:, at + 3]
+    _turn_rotation(lag * drift[0, 2] + heading, turn, q, rates)
+
+
+@njit
+def _hold_feet(
+    limbs: Array, memory: Array, angle: float, drift: Array, ground: Ground, ends: Array, q: Array
+) -> None:  # fmt: skip
+    """Keep feet in stance at their places, and let the frame of the lap follow them (`stance_hold`)."""
+    footing, mixing, soles, contact, _ = ground
+    s, lap, count = angle / (2.0 * np.pi), memory[LAP_HEADING], ends.shape[0]
+    ahead, frame, heading = advance_hand(footing, angle), work_array(3), s * drift[0, 2] + lap
+    _move_lap(memory, heading, carry_root(footing, count, ahead))
+    shift, turn = work_array((2, 3)), work_array(3)
+    x, y = drift_motion(drift, s, 1.0, shift, turn)
+    frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
+    frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
+    frame[2] = heading
+    for n in range(count):
+        last = int(limbs[LIMB_SIZE * n + LAST])
+        hold_stance_foot(footing, n, ahead, mixing, soles[n], contact, frame, ends[n, 0], q[last])
+    x, y = carry_root(footing, count, ahead)
+    _move_lap(memory, heading, (x, y))
+    ends[:, 0, 0] -= x
+    ends[:, 0, 1] -= y
+
+
+@njit
 def combine(
     figure: Array, clips: ClipsAt, angle: float, mixture: Mixture, memory: Array, ground: Ground, pose: Array,
     jacobian: Array,
@@ -227,9 +269,7 @@ def _combine_borrowed(
 ) -> None:  # fmt: skip
     value, slope, drifts = clips
     weights, changes, chain, correction = mixture
-    footing, mixing, soles, contact, floor = ground
     rotations, limbs = int(figure[_ROTATIONS]), int(figure[_LIMBS])
-    corrected = correction.shape[1] > 0
     packed = figure[_GROUPS + rotations :]
     tangents = _PARAMETERS if jacobian.shape[0] > 0 else 0
 
@@ -238,52 +278,25 @@ def _combine_borrowed(
     constant[:] = 0.0
     _mean_position(drifts, constant, 0, weights[0], changes[0], drift)
     update_lap(memory, angle, drift[0])
-    # Root and ends are given in the frame of the drift, and that in the frame of the lap.
-    s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
-    frame, ahead = work_array(3), 0.0
-    if footing.shape[0] > 0:
-        ahead = advance_hand(footing, angle)
-        frame[2] = s * drift[0, 2] + lap
-        _move_lap(memory, frame[2], carry_root(footing, limbs, ahead))
-        x, y = drift_motion(drift, s, 1.0, shift, turn)
-        frame[0] = memory[LAP_X] + np.cos(lap) * x - np.sin(lap) * y
-        frame[1] = memory[LAP_Y] + np.sin(lap) * x + np.cos(lap) * y
-
     q, rates = work_array((rotations, 4)), work_array((rotations, 3, 3))
     _mean_rotations(figure, value, slope, weights, changes, q, rates, tangents)
     root, ends = work_array((4, 3)), work_array((limbs, 4, 3))
     _mean_position(value, slope, 0, weights[0], changes[0], root)
-    if corrected:
-        for k in range(4):
-            root[k, 0] += correction[k, 0]
-            root[k, 1] += correction[k, 1]
+    if correction.shape[1] > 0:
+        root[:, 0] += correction[:, 0]
+        root[:, 1] += correction[:, 1]
     for n in range(limbs):
-        last, end = int(packed[LIMB_SIZE * n + LAST]), ends[n]
-        column = 3 + 4 * rotations + N_END_CHANNELS * n
-        _mean_position(value, slope, column, weights[0], changes[0], end)
-        heading = 0.0
-        if corrected:
-            at = ROOT + FOOT * n
-            end += correction[:, at : at + 3]
-            heading = correction[0, at + 3]
-        lag = value[0, column + 3]
-        x, y = drift_motion(drift, lag, 2.0 * np.pi * slope[0, column + 3], shift, turn)
-        _turn_position(lag * drift[0, 2], turn, x, y, shift, end)
-        if corrected:
-            turn += correction[1:, ROOT + FOOT * n + 3]
-        _turn_rotation(lag * drift[0, 2] + heading, turn, q[last], rates[last])
-        if soles.shape[0] > 0:
-            keep_above(floor, soles[n], end, q[last], rates[last], tangents)
-        if footing.shape[0] > 0:
-            hold_stance_foot(footing, n, ahead, mixing, soles[n], contact, frame, end[0], q[last])
-    if footing.shape[0] > 0:
-        x, y = carry_root(footing, limbs, ahead)
-        _move_lap(memory, frame[2], (x, y))
-        ends[:, 0, 0] -= x
-        ends[:, 0, 1] -= y
+        last, column = int(packed[LIMB_SIZE * n + LAST]), 3 + 4 * rotations + N_END_CHANNELS * n
+        _mean_end(clips, drift, mixture, n, column, ends[n], q[last], rates[last])
+        if ground.soles.shape[0] > 0:
+            keep_above(ground.floor, ground.soles[n], ends[n], q[last], rates[last], tangents)
+    if ground.footing.shape[0] > 0:
+        _hold_feet(packed, memory, angle, drift, ground, ends, q)
     for n in range(limbs):
         solve_limb(packed[LIMB_SIZE * n : LIMB_SIZE * (n + 1)], q, rates, root, ends[n], tangents)
 
+    # Root and ends are given in the frame of the drift, and that in the frame of the lap.
+    s, lap = angle / (2.0 * np.pi), memory[LAP_HEADING]
     x, y = drift_motion(drift, s, 1.0, shift, turn)
     _turn_position(s * drift[0, 2], turn, x, y, shift, root)
     _turn_rotation(s * drift[0, 2] + lap, turn, q[0], rates[0])

@@ -17,13 +17,13 @@ from geometry.arrays import Array, Mask
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
-_MAX_GAP_TIME = 0.1  # longest gap that is interpolated [s]
+MAX_GAP_TIME = 0.1  # longest gap that is interpolated [s]
 # Least ratio of a gap's jumps to the 95th percentile of the joint's steps, and of a single frame's distance from the
 # middle of its neighbours to the 95th percentile of such distances. In the captures of
 # docs/validation/prepared-captures.md and the embedded clips, at their own rates and down to 15 Hz, joints that turn
 # out and back by `_MIN_JUMP_ANGLE` have at most 4.9, except a hand in CMU 16_09, whose markers flip for a frame.
 _MIN_JUMP_RATIO = 5.5
-# Half or twice `_MAX_GAP_TIME` or any of the next values changes none of the 17 captures of the tuning half, except
+# Half or twice `MAX_GAP_TIME` or any of the next values changes none of the 17 captures of the tuning half, except
 # that half of `_MIN_JUMP_ANGLE` changes one by 0.3° RMS.
 _MIN_JUMP_ANGLE = np.deg2rad(15.0)  # least jump of a joint [rad]
 _MIN_ROOT_JUMP = 0.25  # least jump of the root [thigh lengths]
@@ -73,7 +73,7 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
     """Interpolate short gaps whose neighbours agree with each other but not with the frames between.
 
     Both jumps of a gap are large compared with the usual steps of a joint, and the step across it is small compared
-    with them: no joint turns so far in a frame and back within `_MAX_GAP_TIME`. Joints that no segment of the figure
+    with them: no joint turns so far in a frame and back within `MAX_GAP_TIME`. Joints that no segment of the figure
     follows do not count. If the last step of a motion is that large, the last frame is broken and is left out, unless
     it is `rest`, a frame that is stated to show the rest pose.
     """
@@ -90,13 +90,13 @@ def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -
 def _without_gaps(motion: SourceMotion, roles: Roles) -> tuple[SourceMotion, Mask]:
     """The motion with short gaps interpolated, and the frames (n,) that were."""
     broken, used = np.zeros(motion.n_frames, dtype=bool), used_joints(motion, roles)
-    longest = max(1, int(_MAX_GAP_TIME * motion.fps))
+    longest = max(1, int(MAX_GAP_TIME * motion.fps))
     lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
     edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _MIN_JUMP_ANGLE))
     for before, last in pairwise(edges):
         # Programs write zeros for a frame without data.
         broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
-    motion = _interpolate(motion, broken)
+    motion = interpolated(motion, broken)
 
     # Shorter gaps first: otherwise the good frames between two of them would look like a gap.
     tracks: tuple[_Track, ...] = ()
@@ -106,7 +106,7 @@ def _without_gaps(motion: SourceMotion, roles: Roles) -> tuple[SourceMotion, Mas
         for k in found:
             broken[k + 1 : k + 1 + length] = True
         if len(found):
-            motion, tracks = _interpolate(motion, broken), ()
+            motion, tracks = interpolated(motion, broken), ()
     return motion, broken
 
 
@@ -249,8 +249,8 @@ def _distance_to_middle(p: Array) -> Array:
     return _distances(p[1:-1], (p[:-2] + p[2:]) / 2.0)
 
 
-def _interpolate(motion: SourceMotion, broken: Mask) -> SourceMotion:
-    """The motion with broken frames interpolated by cubic splines through the frames beside them."""
+def interpolated(motion: SourceMotion, broken: Mask) -> SourceMotion:
+    """The motion with broken frames (n,) interpolated by cubic splines through the frames beside them."""
     if not broken.any():
         return motion
     rotations, translations = motion.rotations.copy(), motion.translations.copy()

@@ -27,6 +27,8 @@ from models.mocap.retargeting.calibration_pose import calibration_pose_length
 from models.mocap.retargeting.footing import levelled, put_on_floor
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leg_proportions import hips_over_feet
+from models.mocap.retargeting.noise import without_noise
+from models.mocap.retargeting.repeated_frames import without_repeated_frames
 from models.mocap.retargeting.retarget_report import (
     RetargetReport,
     axis_name,
@@ -38,6 +40,7 @@ from models.mocap.retargeting.retarget_report import (
     joint_jump_remarks,
     leg_speed_remarks,
     padding_remarks,
+    smoothing_remarks,
     stretch_remarks,
     unit_name,
 )
@@ -82,7 +85,9 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     """
     rest = hints.rest_frame
     _check_channels(motion, rest)
+    motion, repeated = without_repeated_frames(motion)
     motion, broken, jumps, shortened, joint_jumps = repair_frames(motion, roles, rest)
+    motion, noise = without_noise(motion, roles, jumps)
     frames = _frames(motion, roles, rest)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
@@ -114,6 +119,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     clip = Clip(_poses(*put_on_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
     remarks = (
         *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
+        *smoothing_remarks(repeated[frames.dropped :], noise),
         *padding_remarks(filled, motion.fps, frames.dropped),
         *leg_speed_remarks(legs, motion.fps),
         *slow_step_remarks(path, legs, hip_to_ankle, figure_leg, motion.fps),

@@ -15,6 +15,7 @@ from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import SIDES, BodyLines
 from models.mocap.retargeting.broken_frames import JointJump
 from models.mocap.retargeting.calibration import Calibration
+from models.mocap.retargeting.noise import Noise
 from models.mocap.retargeting.skeleton_roles import Roles
 from models.mocap.retargeting.sole_calibration import MIN_FLAT_FRAMES
 
@@ -206,6 +207,16 @@ def frame_remarks(
     if jumps:
         times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
         yield f"the whole body jumps in a frame at {times}: the gap there is too long to be interpolated"
+
+
+def smoothing_remarks(repeated: Mask, noise: Noise) -> Iterator[str]:
+    """Frames (n,) that repeated the one before, and noise that was removed."""
+    if n := int(repeated.sum()):
+        which = "a frame repeats" if n == 1 else f"{n} of {len(repeated)} frames repeat"
+        yield f"{which} the one before, as where frames are lost or the frame rate was changed: interpolated"
+    if noise.turn or noise.shift:
+        found = f"{np.rad2deg(noise.turn):.1f}° at the joints and {1000.0 * noise.shift:.0f} mm along the path"
+        yield f"noise of {found} RMS was removed: it would hide which feet stand"
 
 
 def padding_remarks(filled: Mask, fps: float, dropped: int) -> Iterator[str]:

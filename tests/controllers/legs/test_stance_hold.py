@@ -78,7 +78,7 @@ def test_mixed_is_zero_for_one_dominant_weight():
 
 
 def test_foot_that_landed_in_a_mixture_stays_until_it_is_lifted_though_a_clip_is_alone_by_then():
-    """The mixture ends half way through a stance; then the foot swings for half a lap, and stands in the next stance."""
+    """The mixture ends half way through a stance; then the foot swings for half a lap, and stands again."""
     stance, swing = path(100, x=0.1 * np.linspace(0.0, 1.0, 100)), path(300, x=0.1, z=0.03)
     mixture = np.concatenate([np.linspace(1.0, 0.0, 50), np.zeros(450)])
     offsets, points = corrected(np.concatenate([stance, swing, stance]), mixture)

@@ -345,3 +345,26 @@ def test_frame_rate_hint_replaces_the_rate_of_the_file(tmp_path):
 def test_invalid_frame_rate_hint_is_refused(rate):
     with pytest.raises(ModelError, match=r"frame rate is .* a second; expected 0\.1 to 10000, such as 60"):
         Hints(frame_rate=rate)
+
+
+@pytest.mark.parametrize(("kept", "repeats"), [((0, 0, 2, 2, 4, 4), "doubled"), ((0, 1, 2, 3, 3, 5), "pulldown")])
+def test_repeated_frames_are_interpolated(kept, repeats, walk_rows):
+    """As where a file of 15 frames a second is written with 30, or 24 with 30."""
+    rows, load_rows = walk_rows
+    n = len(rows) // 6 * 6
+    taken = (np.arange(0, n, 6)[:, None] + kept).ravel()
+    found, whole = load_rows(rows[taken]), load_rows(rows[:n])
+    assert "frames repeat the one before" in " ".join(found.report.remarks)
+    assert not any("repeat" in remark for remark in whole.report.remarks)
+    # But for the second and the last frame, which may be held on purpose.
+    assert largest_angle(Clip(found.clip.poses[2:-1], 30.0, "f"), Clip(whole.clip.poses[2:-1], 30.0, "w")) < 8.0
+    repeated = load_rows(rows[taken] + np.arange(n)[:, None] * 1e-9)
+    assert largest_angle(Clip(repeated.clip.poses[2:-1], 30.0, "f"), Clip(whole.clip.poses[2:-1], 30.0, "w")) > 8.0
+
+
+def test_a_pose_that_is_held_at_an_end_or_for_long_is_no_repeated_frame(walk_rows):
+    rows, load_rows = walk_rows
+    middle = np.concatenate([rows[:12], np.repeat(rows[12:13], 6, axis=0), rows[13:]])
+    ends = np.concatenate([rows[:1], rows, rows[-1:], rows[-1:]])
+    for held in (middle, ends):
+        assert not any("repeat" in remark for remark in load_rows(held).report.remarks)
