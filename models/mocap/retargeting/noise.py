@@ -88,7 +88,7 @@ def _noise(values: Array, fps: float) -> tuple[float, float]:
     moving = values[:, values.std(axis=0) > 10.0 * _NEGLIGIBLE]
     if not moving.shape[1]:
         return 0.0, _CUTOFF_FREQUENCY
-    power = dct(_continued(moving, fps)[0], axis=0, norm="ortho") ** 2
+    power = np.asarray(dct(_continued(moving, fps)[0], axis=0, norm="ortho")) ** 2
     cutoffs = np.geomspace(_LOWEST, 0.49 * fps, _CUTOFFS)
     responses = np.array([_response(len(power), cutoff, fps) for cutoff in cutoffs])
     removed = (1.0 - responses) ** 2 @ power / len(power)  # (cutoffs, m), squares
@@ -107,8 +107,8 @@ def _smoothed(values: Array, cutoff: float, fps: float) -> Array:
         return values
     flat = values.reshape(len(values), -1)
     level, line, first = _continued(flat, fps)
-    smooth = idct(_response(len(level), cutoff, fps)[:, None] * dct(level, axis=0, norm="ortho"), axis=0, norm="ortho")
-    return (smooth + line)[first : first + len(values)].reshape(values.shape)
+    passed = _response(len(level), cutoff, fps)[:, None] * np.asarray(dct(level, axis=0, norm="ortho"))
+    return (np.asarray(idct(passed, axis=0, norm="ortho")) + line)[first : first + len(values)].reshape(values.shape)
 
 
 def _continued(values: Array, fps: float) -> tuple[Array, Array, int]:
