@@ -21,7 +21,6 @@ from numba import njit
 from controllers.curves.splines import control_points, interpolate
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
-from controllers.legs.cyclic_runs import runs
 from controllers.legs.grounded import grounded, max_swing_speed_ratio, stepping
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
@@ -41,6 +40,7 @@ from controllers.work_array import work_array
 from geometry.arrays import Array, Mask
 from geometry.quaternions import about_axis, product
 from geometry.rotations import multiply
+from geometry.spans import cyclic_spans
 from geometry.vectors import unit_rotation
 
 _STRIDE, _PHASE, _SAMPLES, _ROTATIONS, _LIMBS, _FORMS, _WIDTH, _HEADER = range(8)
@@ -260,7 +260,7 @@ class Led(KernelMap):
         if standing is not None:
             stance = standing[np.floor(np.arange(samples) * (len(standing) / samples)).astype(int)]
             sway = np.zeros((2, 2)) if sway is None else sway
-            self.flies = bool(runs(~np.any(stance, axis=1)))
+            self.flies = bool(cyclic_spans(~np.any(stance, axis=1)))
             if longest_step is None or not self.flies:
                 low = grounded(rows, signs, self.stride, limbs, stance, sway)
                 forms = [rows] if low is None else [rows, low]

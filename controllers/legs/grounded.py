@@ -17,12 +17,12 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import convolve1d, minimum_filter1d
 
 from controllers.curves.splines import periodic_interpolation
-from controllers.legs.cyclic_runs import runs
 from controllers.legs.limb_ends import SOFTMIN_WIDTH, lowest_point
 from controllers.legs.limbs import N_END_CHANNELS, Limb
 from controllers.legs.reaching import extension, shortfall, solve_reach
 from controllers.motion.channels import signed_like
 from geometry.arrays import Array, Mask
+from geometry.spans import cyclic_spans
 
 # σ₋, σ₊: the excess of their sum over 1 gives a double support of a tenth of the flight. If the flight is divided 0.6
 # to 0.4 instead of equally, the pelvis is lowered by 7 cm more (docs/validation/led-figures.md).
@@ -57,7 +57,7 @@ def grounded(
     shares : (float, float)
         σ₋, σ₊.
     """
-    flights = runs(~np.any(standing, axis=1))
+    flights = cyclic_spans(~np.any(standing, axis=1))
     warps = [_phase_warp(standing, j, flights, shares) for j in range(len(limbs))]
     if not flights or any(warp is None for warp in warps):
         return None
@@ -100,7 +100,7 @@ def stepping(
     """
     if not standing.any(axis=0).all():
         return None
-    steps = min(stride, longest * len(runs(~np.any(standing, axis=1))))
+    steps = min(stride, longest * len(cyclic_spans(~np.any(standing, axis=1))))
     ratio, first, result = steps / stride, rows.shape[1] - N_END_CHANNELS * len(limbs), rows.copy()
     result[:, 0] *= ratio
     for j, limb in enumerate(limbs):
@@ -114,14 +114,14 @@ def stepping(
 
 def max_swing_speed_ratio(standing: Mask) -> float:
     """Largest ψ' of stepping limbs with the stances `standing` (n, limbs): their swing speed over the clip's."""
-    flights, n = runs(~np.any(standing, axis=1)), len(standing)
+    flights, n = cyclic_spans(~np.any(standing, axis=1)), len(standing)
     warps = [_phase_warp(standing, j, flights, _STEP_SHARES) for j in range(standing.shape[1])]
     return max(float(np.diff(warp, append=warp[0] + n).max()) for warp in warps if warp is not None)
 
 
 def _phase_warp(standing: Mask, j: int, flights: list[tuple[int, int]], shares: tuple[float, float]) -> Array | None:
     """ψ n of limb j at the samples of the lap; None if it is never in stance, or would land before it lifts off."""
-    n, own = len(standing), runs(standing[:, j])
+    n, own = len(standing), cyclic_spans(standing[:, j])
     if not own:
         return None
     before = {end % n: end - start for start, end in flights}

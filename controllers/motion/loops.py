@@ -8,7 +8,6 @@ in R³ for the root's position and in R⁴, normalised, for each rotation.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -263,13 +262,7 @@ def append_reversal(poses: Array, fps: float) -> Array:
 
 def closed_loop(poses: Array, fps: float) -> Loop:
     """Loop of a clip; an open clip that nearly rests at both ends is played there and back (`append_reversal`)."""
-    return _closed_loop(np.asarray(poses, dtype=np.float64).tobytes(), poses.shape[1], fps)
-
-
-@lru_cache(maxsize=16)  # the runs of a sweep, a study or a live page close the same clips
-def _closed_loop(numbers: bytes, nq: int, fps: float) -> Loop:
-    poses = np.frombuffer(numbers, dtype=np.float64).reshape(-1, nq)
-    return forward_loop(append_reversal(poses, fps), fps)
+    return forward_loop(append_reversal(np.asarray(poses, dtype=np.float64), fps), fps)
 
 
 def forward_loop(poses: Array, fps: float) -> Loop:

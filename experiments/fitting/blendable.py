@@ -8,10 +8,10 @@ from controllers.legs.limbs import Limb
 from controllers.motion.loops import Loop, checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap, natural_lap
 from geometry import quaternions
+from geometry.spans import spans
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, JOINTS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import sole_points
-from models.mocap.motion.spans import spans
 from sim.body.figure_state import FigureGains
 
 MAX_FLIGHT_TIME = 0.3  # [s], 11 cm high: the mean of a longer flight and a motion on the floor is neither

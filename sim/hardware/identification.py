@@ -39,7 +39,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from geometry.arrays import Array, Mask
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 from models.phantom.dynamics import WEIGHT_2, WEIGHT_3, coriolis_matrix, mass_matrix
 from models.phantom.parameters import PREMIUM_1_5
 from sim.errors import SimError

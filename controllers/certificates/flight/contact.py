@@ -20,6 +20,7 @@ import numpy as np
 from controllers.certificates.flight.flight_fit import COM_NOISE
 from controllers.certificates.flight.tolerance import ContactTolerance
 from geometry.arrays import Array, Mask
+from geometry.spans import spans
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ def contact_doubts(
                 f"its lowest point is {1e3 * low:.0f} to {1e3 * high:+.0f} mm from where it stands, beyond "
                 f"±{1e3 * tolerance.spread:g}"
             )
-    unheld = _longest_run(touched.supported & ~touched.held) / fps
+    unheld = max((end - start for start, end in spans(touched.supported & ~touched.held)), default=0) / fps
     figures |= {"unheld": unheld, "skate": touched.skate}
     if unheld > tolerance.unheld:
         doubts.append(f"for {unheld:.2f} s it is near the floor with no part at rest, longer than {tolerance.unheld:g}")
@@ -94,9 +95,3 @@ def _jump_doubts(
             at = int(np.argmax(leaps)) + 1
             doubts.append(f"a joint leaps by {np.rad2deg(turned[at]):.0f}° in one frame, at {(at + 1) / fps:.2f} s")
     return doubts
-
-
-def _longest_run(mask: Mask) -> int:
-    """Number of frames of the longest run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))

@@ -14,6 +14,7 @@ from scipy.special import stdtrit
 
 from geometry.arrays import Array, Mask
 from geometry.physics import GRAVITY
+from geometry.spans import spans
 
 COM_NOISE = 3e-3  # [m] accuracy of the centre of mass of a captured body
 MIN_FLIGHT_FRAMES = 5  # frames of a flight: two more than a parabola has coefficients
@@ -88,9 +89,8 @@ def find_flights(supported: Mask, fps: float) -> list[tuple[int, int]]:
     fps : float
         Frames per second [1/s].
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], supported, [True]]).astype(np.int8)))
-    spans = [(max(int(a) - 1, 0), min(int(b), len(supported) - 1)) for a, b in edges.reshape(-1, 2)]
-    return [(a, b) for a, b in spans if b - a + 1 >= MIN_FLIGHT_FRAMES and (b - a) / fps >= MIN_FLIGHT_DURATION]
+    flights = [(max(a - 1, 0), min(b, len(supported) - 1)) for a, b in spans(~supported)]
+    return [(a, b) for a, b in flights if b - a + 1 >= MIN_FLIGHT_FRAMES and (b - a) / fps >= MIN_FLIGHT_DURATION]
 
 
 def fit_flight(

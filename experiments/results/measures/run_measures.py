@@ -25,8 +25,8 @@ from experiments.results.measures.summary_parts import (
     TraceSummary,
 )
 from geometry.arrays import Array, Mask
+from geometry.spans import spans
 from models.mocap.motion.clip import pose_difference
-from models.mocap.motion.spans import spans
 from sim.recording.recording import Recording
 
 Span = tuple[float, float]

@@ -23,7 +23,7 @@ from experiments.files.figure_files import save_figure
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.phases import performance_start
 from geometry.arrays import Array, Mask
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 from sim.recording.recording import Recording
 from sim.viewer.palette import CURVE, FIELD, MIN_PUSH_FORCE, TUBE, USER
 from sim.viewer.shown import courses

@@ -25,9 +25,9 @@ from experiments.setups.parts.defaults import tube_gains
 from experiments.setups.parts.pace import course_of
 from experiments.setups.parts.part_types import ClipMapParts, Measuring, Notes, Parts
 from geometry.arrays import Array
+from geometry.spans import spans
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
-from models.mocap.motion.spans import spans
 from sim.users.hand.actions import Grab
 from sim.world.world import FigureKind
 

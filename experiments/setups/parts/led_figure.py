@@ -18,11 +18,11 @@ from experiments.setups.parts.clips import load_clips
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.setups.parts.part_types import MapParts
 from geometry.arrays import Mask
+from geometry.spans import spans
 from models.humanoid.skeleton import proportion
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded_names
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
-from models.mocap.motion.spans import spans
 from models.mocap.preparation.laps import best_lap
 from models.mocap.preparation.looping import close_or_rest
 from sim.world.world import FigureKind

@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 
 from geometry.arrays import Array, Mask
+from geometry.spans import cleaned
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
-from models.mocap.motion.spans import cleaned
 
 # Height below which a part touches at any speed [m]. Half or twice the value changes whether the body is supported in
 # 0.8 % of the frames of 17 captures.

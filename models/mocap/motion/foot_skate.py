@@ -17,7 +17,7 @@ import numpy as np
 
 from geometry import quaternions
 from geometry.arrays import Array, Mask
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 
 
 class ContactSlide:

@@ -16,8 +16,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from geometry.arrays import Array, Mask
+from geometry.spans import cleaned, spans
 from models.humanoid.skeleton import CONTACT_RADIUS
-from models.mocap.motion.spans import cleaned, spans
 
 # Rate [rad/s] and angle [rad] above which a foot turns in its stance. No walk or run among the 28 captures of
 # docs/validation/prepared-captures.md has such a turn; other values were not tried.

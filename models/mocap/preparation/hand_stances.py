@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.arrays import Array, Mask
+from geometry.spans import cleaned, spans
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.contacts import HAND_REACH, MAX_FILLED_GAP, MIN_STANCE_TIME, contacts
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS, Floor
 from models.mocap.motion.clip import Clip, pose_difference
-from models.mocap.motion.spans import cleaned, spans
 
 # Least decrease of the residual by the hands [body weights]. Of 39 stances of palms in falls of LAFAN, and in a crawl,
 # a roll and two motions of getting up of DeepMimic, 32 lower it by 0.27 or more, 7 by 0.17 or less; with half the value

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from geometry.physics import GRAVITY
+from geometry.spans import spans
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points
-from models.mocap.motion.spans import spans
 from models.mocap.preparation.bounds import MAX_FLIGHT_ACCELERATION_ERROR
 
 # Least height of feet and hands in flight [m]: captured feet hover by 1 to 2 cm while they stand. Half the value slows

@@ -17,13 +17,13 @@ from scipy.ndimage import gaussian_filter1d
 from geometry import quaternions
 from geometry.arrays import Array, Mask
 from geometry.physics import GRAVITY
+from geometry.spans import cleaned, spans
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, soles
 from models.mocap.dynamics.contacts import standing_parts
 from models.mocap.dynamics.floor_forces import ALL_CONTACTS
 from models.mocap.dynamics.momentum import momentum
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points, global_rotations, sole_points
-from models.mocap.motion.spans import cleaned, spans
 from models.mocap.preparation.foot_places import MIN_LOAD, flat_sole, foot_turns, place_foot
 from models.mocap.preparation.hand_stances import extend_hand_stances, loaded_hands
 from models.mocap.preparation.poses import with_neighbours

@@ -7,9 +7,9 @@ import numpy as np
 
 from geometry.arrays import Array, Mask, rms
 from geometry.physics import GRAVITY
+from geometry.spans import spans
 from models.humanoid.skeleton import JOINTS
 from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.motion.spans import spans
 from models.mocap.readers.motion_file import printable
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import SIDES, BodyLines

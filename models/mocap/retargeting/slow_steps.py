@@ -17,7 +17,7 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.physics import GRAVITY
 from geometry.quaternions import unit
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 from models.mocap.retargeting.retarget_report import two_digits
 
 _USUAL_RATIO = 1.5  # W of walks, runs have up to 1.8

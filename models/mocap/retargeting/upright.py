@@ -28,7 +28,7 @@ import numpy as np
 
 from geometry.arrays import Array, IntArray, Mask
 from geometry.quaternions import unit
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 from models.mocap.readers.motion_file import MotionFileError
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.body_lines import AT_REST, BodyLines, body_lines

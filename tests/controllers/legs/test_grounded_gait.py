@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from controllers.haptic_map.led import Led
-from controllers.legs.cyclic_runs import runs
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.led_figure import led_map
 from models.humanoid.skeleton import figure_model
@@ -27,13 +26,6 @@ def figure():
 @pytest.fixture(scope="module")
 def run(figure):
     return led_map(embedded("run"), figure)
-
-
-def test_runs_of_a_cyclic_mask_wrap_round():
-    assert runs(np.array([1, 1, 0, 0, 1], dtype=bool)) == [(4, 7)]
-    assert runs(np.array([0, 1, 1, 0, 1, 0], dtype=bool)) == [(1, 3), (4, 5)]
-    assert runs(np.ones(4, dtype=bool)) == []
-    assert runs(np.zeros(4, dtype=bool)) == []
 
 
 def test_grounded_run_has_no_flight_and_no_foot_skate(figure, run):

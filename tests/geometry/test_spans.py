@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.mocap.motion.spans import cleaned, spans
+from geometry.spans import cleaned, cyclic_spans, spans
 
 
 def mask(marks: str):
@@ -41,3 +41,10 @@ def test_cleaned_fills_short_gaps_then_drops_short_runs_unless_all_is_true(marks
 def test_cleaned_joins_runs_and_gaps_across_the_seam_of_a_closed_mask(marks, expected):
     given = mask(marks)
     np.testing.assert_array_equal(cleaned(given, 3, 4, closed=True), mask(expected))
+
+
+def test_runs_of_a_cyclic_mask_wrap_round():
+    assert cyclic_spans(np.array([1, 1, 0, 0, 1], dtype=bool)) == [(4, 7)]
+    assert cyclic_spans(np.array([0, 1, 1, 0, 1, 0], dtype=bool)) == [(1, 3), (4, 5)]
+    assert cyclic_spans(np.ones(4, dtype=bool)) == []
+    assert cyclic_spans(np.zeros(4, dtype=bool)) == []

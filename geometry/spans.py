@@ -1,4 +1,4 @@
-"""Spans of a mask over frames: runs of True, and a mask without spans that are too short."""
+"""Spans of a mask over frames: runs of True, also round a lap, and a mask without spans that are too short."""
 
 import numpy as np
 
@@ -9,6 +9,18 @@ def spans(mask: Mask) -> list[tuple[int, int]]:
     """First frame of each run of True in a mask (n,), and the first frame after it."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def cyclic_spans(mask: Mask) -> list[tuple[int, int]]:
+    """First sample of each run of True in a mask round a lap, and the first one after it, which may exceed the length.
+
+    A mask that is constant has no runs.
+    """
+    n = len(mask)
+    starts = np.flatnonzero(mask & ~np.roll(mask, 1))
+    last = np.flatnonzero(mask & ~np.roll(mask, -1)) + 1
+    ends = np.append(last, last + n)
+    return [(int(start), int(ends[ends > start][0])) for start in starts]
 
 
 def cleaned(mask: Mask, gap: int, short: int, closed: bool = False) -> Mask:
