@@ -11,12 +11,11 @@ from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, Judgemen
 from controllers.certificates.loop.energy import energy
 from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.loop.laws import LAWS, FollowForce, Law, follow_law
+from controllers.certificates.loop.laws import LAWS, FollowForce, follow_law
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.stability import River
 from controllers.certificates.region.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, without_laws
-from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certificate_page import certificate_page, flights_figure, region_figure, stability_figure
@@ -67,14 +66,12 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     course, sampling = certified_curves(config)[""], certified_sampling(config, delay)
     device = phantom_device(linkage_of(config.device))
     return {
-        name: River(_symbolic_law(law, config, course), stiffness, damping, width, course, device, sampling)
+        name: River(
+            follow_law(1.0 - compensation(given_curves(config)[""], course)) if law == "parallel" else LAWS[law],
+            stiffness, damping, width, course, device, sampling,
+        )
         for name, (law, stiffness, damping, width) in certified_laws(config).items()
-    }
-
-
-def _symbolic_law(name: str, config: RunConfig, course: Trajectory) -> Law:
-    """A law of a run by its name in `certified_laws`."""
-    return follow_law(1.0 - compensation(given_curves(config)[""], course)) if name == "parallel" else LAWS[name]
+    }  # fmt: skip
 
 
 def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:

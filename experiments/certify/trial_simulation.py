@@ -198,14 +198,6 @@ def trial_model(hand: HandImpedance, step: float, coulomb: bool, integrator: muj
     return spec.compile()
 
 
-def linkage_plant(model: mujoco.MjModel, data: mujoco.MjData, port: PhantomPort, substeps: int) -> Plant:
-    """A plant of the Phantom alone; model, data and port must outlive it."""
-    return Plant(
-        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
-        ground=np.zeros(3), arm_v=port.arm_v, substeps=substeps, period=port.period,
-    )  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Conditions:
     """Effects modelled beyond the linear loop, and the time step.
@@ -279,7 +271,10 @@ def hand_path(
     for name, angle, speed in zip(names, angles, rates, strict=True):
         data.joint(name).qpos[0], data.joint(name).qvel[0] = angle, speed
     mujoco.mj_forward(model, data)
-    plant = linkage_plant(model, data, port, conditions.substeps)
+    plant = Plant(
+        model=model._address, data=data._address, qpos=data.qpos, ctrl=data.ctrl, applied=data.qfrc_applied,
+        ground=np.zeros(3), arm_v=port.arm_v, substeps=conditions.substeps, period=period,
+    )  # fmt: skip
     hand, program = make_hand(user or trial.user(k_r)), trial.program(k_r)
     path = np.zeros((ticks, 3))
     field = Executed(program.compiled(), program.fresh_memory(), program.fresh_walkers())

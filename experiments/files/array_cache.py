@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from geometry.arrays import Array
 from sim.compilation.hashed_files import read_hashed, write_hashed
+from sim.compilation.sources import results_folder
 
 
 def cached_array(
-    folder: Path,
+    module: str,
     name: str,
     made_of: Iterable[npt.NDArray[np.generic]],
     shape: tuple[int, ...],
@@ -26,8 +27,8 @@ def cached_array(
 
     Parameters
     ----------
-    folder : Path
-        Folder of the cache; created if it is missing.
+    module : str
+        Dotted name of the module that computes the result: a change of its code invalidates what is cached.
     name : str
         Name of the kind of array, the first part of the file's name.
     made_of : iterable of arrays
@@ -37,7 +38,7 @@ def cached_array(
     find : callable
         Computes the result.
     """
-    path = _cache_file(folder, name, made_of)
+    path = _cache_file(module, name, made_of)
     if (cached := _read(path, shape)) is not None:
         return cached
     found = np.ascontiguousarray(find(), dtype=np.float64)
@@ -46,13 +47,13 @@ def cached_array(
     return found
 
 
-def is_cached(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
+def is_cached(module: str, name: str, made_of: Iterable[npt.NDArray[np.generic]], shape: tuple[int, ...]) -> bool:
     """Whether `cached_array` would return a cached array."""
-    return _read(_cache_file(folder, name, made_of), shape) is not None
+    return _read(_cache_file(module, name, made_of), shape) is not None
 
 
-def _cache_file(folder: Path, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
-    return folder / f"{name}-{_digest(made_of).hex()}.kept"
+def _cache_file(module: str, name: str, made_of: Iterable[npt.NDArray[np.generic]]) -> Path:
+    return results_folder(module) / f"{name}-{_digest(made_of).hex()}.kept"
 
 
 def _read(path: Path, shape: tuple[int, ...]) -> Array | None:

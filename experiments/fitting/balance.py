@@ -24,7 +24,6 @@ from geometry.physics import GRAVITY
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS
 from models.mocap.dynamics.zero_moment_point import nearest_supported, sway_of, zero_moment_point
 from sim.body.falls import TOUCH_HEIGHT
-from sim.compilation.sources import results_folder
 from sim.reference.reference import map_poses
 
 _LAP_SAMPLES, _LED_LAP_SAMPLES = 96, 192  # samples of a lap
@@ -79,7 +78,7 @@ def with_balance(haptic_map: Cylindrical, figure: mujoco.MjModel, lap: float) ->
     mujoco.mj_saveModel(figure, None, model)
     made_of = (haptic_map.compiled().params, haptic_map.mixtures, haptic_map.drifts, model, np.array([lap]))
     return haptic_map.with_sway(
-        cached_array(results_folder(__name__), "sway", made_of, shape, lambda: _compute_sway(haptic_map, figure, lap))
+        cached_array(__name__, "sway", made_of, shape, lambda: _compute_sway(haptic_map, figure, lap))
     )
 
 

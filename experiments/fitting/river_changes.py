@@ -27,7 +27,6 @@ from models.mocap.motion.clip import Clip
 from models.mocap.preparation.contact_loads import contact_forces
 from models.mocap.preparation.feasible import Feasible, feasible
 from models.mocap.preparation.stances import Stances, stances
-from sim.compilation.sources import results_folder
 from sim.compilation.workers import run_in_workers
 from sim.reference.reference import make_reference, map_poses, reference_along
 
@@ -124,7 +123,7 @@ def with_changes(haptic_map: RiverClips, blend: float, figure: mujoco.MjModel) -
         gates += [
             _Gate(first, second, k, strides, span * (k + np.arange(_N_MOMENTS) / _N_MOMENTS)) for k in range(parts)
         ]
-    missing = [gate for gate in gates if not is_cached(results_folder(__name__), gate.name, made_of, _ROW_SHAPE)]
+    missing = [gate for gate in gates if not is_cached(__name__, gate.name, made_of, _ROW_SHAPE)]
     if missing:
         with working("making rivers' changes feasible", len(missing)):
             run_in_workers([(_cached_change, (one_river, made_of, blend, figure, gate)) for gate in missing])
@@ -145,7 +144,7 @@ def _cached_change(
     def find() -> Array:
         return _change(haptic_map, blend, figure, gate.first, gate.second, gate.moments)
 
-    return cached_array(results_folder(__name__), gate.name, made_of, _ROW_SHAPE, find)
+    return cached_array(__name__, gate.name, made_of, _ROW_SHAPE, find)
 
 
 def _stride_count(haptic_map: RiverClips, first: int, second: int) -> int:

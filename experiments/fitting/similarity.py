@@ -17,7 +17,6 @@ from experiments.fitting.hand_tours import domain, poses_about_circle
 from experiments.fitting.verdict import MAX_FOOT_SKATE, Motion, motion_of
 from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES
-from sim.compilation.sources import results_folder
 
 # [body weights] RMS residual above the clips' from which clips differ; for foot skate it is `MAX_FOOT_SKATE`
 _MAX_EXCESS_RESIDUAL = 0.06
@@ -41,7 +40,7 @@ def moves_alike(haptic_map: Cylindrical, lap: float) -> bool:
         return np.array([motion_at(haptic_map, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
     made_of = (haptic_map.compiled().params, np.array([lap]))
-    found = cached_array(results_folder(__name__), "alike", made_of, (5, 4), find)
+    found = cached_array(__name__, "alike", made_of, (5, 4), find)
     corner_median = np.median(found[1:], axis=0)
     return bool(
         found[0, 0] < corner_median[0] + _MAX_EXCESS_RESIDUAL and found[0, 2] < corner_median[2] + MAX_FOOT_SKATE
@@ -58,7 +57,7 @@ def carries_alike(haptic_map: Composite, lap: float) -> bool:
         return np.array([motion_at(own, _MIDDLE, lap), *others])
 
     made_of = (haptic_map.compiled().params, np.array([lap]))
-    found = cached_array(results_folder(__name__), "carries", made_of, (4, 4), find)
+    found = cached_array(__name__, "carries", made_of, (4, 4), find)
     return bool(found[1:, 0].max() < found[0, 0] + _MAX_EXCESS_RESIDUAL)
 
 

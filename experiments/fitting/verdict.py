@@ -13,7 +13,6 @@ from models.humanoid.skeleton import CONTACT_RADIUS
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.ranges import beyond_ranges
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
-from sim.compilation.sources import results_folder
 from sim.compilation.unit_workers import compile_units
 
 MAX_FOOT_SKATE = 0.02
@@ -144,4 +143,4 @@ class Trial(NamedTuple):
         return bool(lowest > -MAX_PENETRATION and skate <= MAX_FOOT_SKATE and beyond < MAX_JOINT_EXCESS)
 
     def _cached(self, name: str, count: int, find: Callable[[], Array]) -> list[float]:
-        return cached_array(results_folder(self.module), name, self.made_of, (1, count), find)[0].tolist()
+        return cached_array(self.module, name, self.made_of, (1, count), find)[0].tolist()

@@ -82,10 +82,12 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
     session = _compile_session(given, options, console)  # which remarks on what was left open
     job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene, known)
-    make = MakeServo(
-        served(config), options.name, _gate(config, options), known.offset, calibration_from(content),
-        silent=options.silence,
+    gate = Gate(
+        config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
+        small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
     )  # fmt: skip
+    offset, calibration = known.offset, calibration_from(content)
+    make = MakeServo(served(config), options.name, gate, offset, calibration, silent=options.silence)
     with run_folder(options) as begin, contextlib.ExitStack() as stack:
         if options.name == EMULATED:
             make_device = MakeEmulated(scene, start_of(session), emulated_linkage)
@@ -150,14 +152,6 @@ def run_folder(options: RunHardware) -> Generator[Callable[[], None], None, None
             with contextlib.suppress(OSError):  # other files are in it
                 if is_new:
                     out.rmdir()
-
-
-def _gate(config: RunConfig, options: RunHardware) -> Gate:
-    """The safety gate with the limits of the options, for a device that has passed `_check_permit`."""
-    return Gate(
-        config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
-        small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
-    )  # fmt: skip
 
 
 def _check_permit(config: RunConfig, options: RunHardware, console: Console) -> None:

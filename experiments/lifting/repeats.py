@@ -43,7 +43,10 @@ def repeated(clips: Sequence[Clip]) -> tuple[tuple[Clip, ...], tuple[int, ...]]:
     common = _common_strides([(unit.duration, count) for unit, count in units if count])
     if not common:
         units = [(clip, 0) for clip in clips]
-    rounds = tuple(common // count if count else _fewest_rounds(unit) for unit, count in units)
+    rounds = tuple(
+        common // count if count else math.ceil(_MIN_LAP_DURATION / unit.duration) if unit.closes() else 1
+        for unit, count in units
+    )
     return tuple(_repeat(unit, times) for (unit, _), times in zip(units, rounds, strict=True)), rounds
 
 
@@ -71,10 +74,6 @@ def _common_strides(gaits: Sequence[tuple[float, int]]) -> int:
     times = math.ceil(max(_MIN_LAP_DURATION * count / seconds for seconds, count in gaits) / least)
     slowest = max(seconds / count for seconds, count in gaits)
     return times * least if times * least * slowest <= _MAX_LAP_DURATION else 0
-
-
-def _fewest_rounds(clip: Clip) -> int:
-    return math.ceil(_MIN_LAP_DURATION / clip.duration) if clip.closes() else 1
 
 
 def _repeat(clip: Clip, times: int) -> Clip:

@@ -31,7 +31,7 @@ from sim.devices.driver import DriverFault
 from sim.viewer.hand_ball import HandBall
 from sim.viewer.live_stage import LiveStage, light
 from sim.viewer.shown import COURSE_POINTS, Moment, courses
-from sim.viewer.views import VIEWS, View, add_view_buttons, is_phone, open_with, window_of
+from sim.viewer.views import VIEWS, add_view_buttons, is_phone, open_with, window_of
 from sim.world.world import World
 
 MIN_FRAME_INTERVAL = 1.0 / 60.0  # [s] shortest time between two frames
@@ -67,7 +67,8 @@ class Page:
         self._drawn_builds, self._drawn_curve, self._drawn_moment = 0, -1.0, (-1.0, -1.0)
         self.pictures = 0
         self._add_panels(config, shadows)
-        open_with(self.server, _first_view)
+        # Workspace and stage; on a phone only the workspace, above the panel.
+        open_with(self.server, lambda client: VIEWS["workspace" if is_phone(*window_of(client.camera)) else "both"])
         self.server.on_client_disconnect(self._on_disconnect)
         self._cap, message = open_cap_hand()
         if message:
@@ -265,8 +266,3 @@ class Page:
         self._uploads.write()
         self._run.write()
         self._plots.write(desk.history)
-
-
-def _first_view(client: viser.ClientHandle) -> View:
-    """Workspace and stage; on a phone only the workspace, above the panel."""
-    return VIEWS["workspace" if is_phone(*window_of(client.camera)) else "both"]

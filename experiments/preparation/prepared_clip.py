@@ -11,7 +11,6 @@ from experiments.files.array_cache import cached_array, is_cached
 from geometry.arrays import Array
 from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
-from sim.compilation.sources import results_folder
 from sim.compilation.workers import run_in_workers
 
 # A change of this module, or of any that it imports, invalidates the cache.
@@ -68,7 +67,7 @@ class _Capture(NamedTuple):
 
     @property
     def is_kept(self) -> bool:
-        return is_cached(results_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape)
+        return is_cached(_PREPARING_MODULE, "prepared", self._cache_key, self._shape)
 
     @property
     def _cache_key(self) -> tuple[Array, Array]:
@@ -84,7 +83,7 @@ class _Capture(NamedTuple):
         notes = () if report is None else tuple(f"{self.path.name}: {note}" for note in report.notes())
         if raw or report is None:
             return PreparedClip(clip, notes)
-        rows = cached_array(results_folder(_PREPARING_MODULE), "prepared", self._cache_key, self._shape, self._prepare)
+        rows = cached_array(_PREPARING_MODULE, "prepared", self._cache_key, self._shape, self._prepare)
         outcome = (
             "prepared" + self._part(rows[0, 2:5])
             if rows[0, 1]

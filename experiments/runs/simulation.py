@@ -289,7 +289,8 @@ class Simulation:
         """Step tick by tick, without end or to the end of a replayed hand: ``for tick in sim``."""
         session = self.session()
         loop = session.loop()
-        left = available_ticks(session.servo.device)
+        left, world = available_ticks(session.servo.device), session.world
+        body = slice(world.pose_at, world.pose_at + world.body.nq)
         for _ in itertools.count() if left is None else range(left):
             with session.naming_laws():
                 ticks, frames = loop.step()
@@ -297,7 +298,7 @@ class Simulation:
             force, torque = ticks.field[0, :3].copy(), ticks.field[0, 3:].copy()
             yield Tick(
                 HandState.of(ticks.hand[0]), Wrench(force, torque), ticks.force[0].copy(),
-                session.servo.reference.pose.copy(), session.body_pose(frames.qpos[0]),
+                session.servo.reference.pose.copy(), frames.qpos[0, body].copy(),
             )  # fmt: skip
 
     def description(self) -> dict[str, object]:

@@ -131,10 +131,6 @@ class Session:
         body = self.world.body
         return float(body.body_subtreemass[1]) * float(np.linalg.norm(body.opt.gravity))
 
-    def body_pose(self, qpos: Array) -> Array:
-        """The body's part of a recorded configuration: shape (75,), or (7,) of a robot arm; empty without a body."""
-        return qpos[self.world.pose_at : self.world.pose_at + self.world.body.nq].copy()
-
 
 def default_poses(session: Session, stride: int = 1) -> Callable[[Array, Array, Array], Array]:
     """A function from nearest points (k, 3), phases (k,) and rivers (k,) to poses (k, 75) of the default animation.

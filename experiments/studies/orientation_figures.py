@@ -72,7 +72,9 @@ def turning_figure(recording: Recording) -> Figure:
     turn = np.array([logarithm(*q) for q in recording.channel("ticks", "quaternion")[::8]])
     moment = recording.channel("ticks", "field")[:][:, 3:]
     animation = bearing(recording.channel("frames", "reference")[:])
-    physical, base = bearing(_figure_poses(recording)), bearing(_base_poses(recording))
+    root = int(world_of(recording).joint(FIGURE + "root").qposadr[0])
+    physical = bearing(recording.channel("frames", "qpos")[:][:, root : root + N_POSE])
+    base = bearing(_base_poses(recording))
     figure = Figure(figsize=(9.0, 8.4), layout="constrained")
     axes = figure.subplots(5, 1, sharex=True)
     for i, name in enumerate(("roll", "pitch", "yaw")):
@@ -112,11 +114,6 @@ def frames_picture(recording: Recording) -> npt.NDArray[np.uint8]:
             renderer.update_scene(data, camera)
             pictures.append(renderer.render().copy())
     return np.hstack(pictures)
-
-
-def _figure_poses(recording: Recording) -> Array:
-    root = int(world_of(recording).joint(FIGURE + "root").qposadr[0])
-    return recording.channel("frames", "qpos")[:][:, root : root + N_POSE]
 
 
 def _base_poses(recording: Recording) -> Array:

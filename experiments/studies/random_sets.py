@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.haptic_map.lifting.room import Room
-from controllers.motion.loops import checked_clip, closed_loop
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import best_lap, not_blendable, off_pace, timing_clip
+from experiments.fitting.blendable import best_lap, closed_loops, not_blendable, off_pace, timing_clip
 from experiments.fitting.verdict import motion_of
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
@@ -82,16 +81,12 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
     residual, fell, *_ = followed(clip)
-    reason = "; ".join(not_blendable((clip, _rest_clip(clip))))
+    # Against a clip at rest is tested whether a clip can be blended at all.
+    reason = "; ".join(not_blendable((clip, Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest"))))
     if not reason and (fell is not None or residual > MAX_SOLO_RESIDUAL):
         fault = f"has a residual of {100 * residual:.0f} %" if fell is None else f"falls at {fell:.1f} s"
         reason = f"alone {fault}"
     return Captured(name, reason, residual, fell), clip
-
-
-def _rest_clip(clip: Clip) -> Clip:
-    """A clip at rest, against which is tested whether a clip can be blended at all."""
-    return Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest")
 
 
 def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str, folder: str) -> dict[str, Any]:
@@ -101,7 +96,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     clip, at that clip's pace.
     """
     began = time.process_time()
-    loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in clips]
+    loops = closed_loops(clips)
     timing = 0 if kind == "composite" else timing_clip(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"

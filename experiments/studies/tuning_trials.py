@@ -27,12 +27,6 @@ def replication(config: TuneConfig, number: int) -> TuneConfig:
     return replace(config, seed=number, users=panel, held_back=held_back)
 
 
-def tuning_trials(tuning: Path, out: Path, numbers: Sequence[int]) -> list[Tuned]:
-    """Run the replications with these numbers of a tuning file."""
-    config = read_tuning(tuning)
-    return [run_tuning(replication(config, number), out / f"{number}") for number in numbers]
-
-
 def lines(found: Sequence[Tuned]) -> list[str]:
     """Chosen values of each replication, and for each contender and objective the gains with their mean, in words."""
     lines = [_chosen_line(one) for one in found]
@@ -77,4 +71,5 @@ def _chosen_line(one: Tuned) -> str:
 
 if __name__ == "__main__":
     _, file, folder, first, last = sys.argv
-    print("\n".join(lines(tuning_trials(Path(file), Path(folder), range(int(first), int(last) + 1)))))
+    config, numbers = read_tuning(Path(file)), range(int(first), int(last) + 1)
+    print("\n".join(lines([run_tuning(replication(config, n), Path(folder) / f"{n}") for n in numbers])))

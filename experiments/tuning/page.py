@@ -39,7 +39,9 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
         gain_ratio = np.array([np.nan if c.margin is None else 1.0 / (1.0 + c.margin) for c in tried])
         points = axis.scatter(costs[:, 0], costs[:, 1], c=gain_ratio, s=26, cmap="viridis", label="tried")
         figure.colorbar(points, label="k_r over the critical k_r (the certificate's boundary is 1)")
-        pareto = _front_of_two(config, tried)
+        two = [c._replace(objectives=pair[:2]) for c in tried if (pair := c.objectives) is not None]
+        front = pareto_front(two, config.directions[:2])
+        pareto = np.array(sorted(c.objectives for c in front if c.objectives is not None))
         axis.plot(pareto[:, 0], pareto[:, 1], color=_FRONT, lw=1.2, marker="o", mfc="none", ms=9, label="front of both")
         chosen_costs = np.array(chosen.objectives)
         axis.plot(chosen_costs[:1], chosen_costs[1:2], "*", color=_CHOSEN, ms=14, label="chosen")
@@ -48,12 +50,6 @@ def objectives_figure(config: TuneConfig, candidates: Sequence[Candidate], chose
     axis.legend(framealpha=0.85, edgecolor="none", fontsize=9)
     axis.grid(alpha=0.3)
     return figure
-
-
-def _front_of_two(config: TuneConfig, tried: Sequence[Candidate]) -> np.ndarray:
-    """Pareto front of the first two objectives alone, sorted by the first, shape (n, 2)."""
-    two = [c._replace(objectives=c.objectives[:2]) for c in tried if c.objectives is not None]
-    return np.array(sorted(c.objectives for c in pareto_front(two, config.directions[:2]) if c.objectives is not None))
 
 
 def gains_figure(

@@ -6,7 +6,7 @@ A device is a NamedTuple with arrays `hand` (15,), `torque` (3,), `faults` and `
 - `actuate(device, force)` commands a force on the hand [N], in H;
 - `advance(device, plant, t, replay, applied)` steps the world by one servo period.
 
-To add a device, write its type and kernels in a file of their own, and list them in the tables here.
+To add a device, write its type and kernels in a file of their own, and list them in the table here.
 """
 
 from typing import Any, TypeAlias
@@ -25,43 +25,42 @@ from sim.world.plant import Plant
 
 DeviceState: TypeAlias = SimulatedPhantom | ReplayedHand | Exchange
 
-_SENSE: dict[type, Any] = {SimulatedPhantom: sense_simulated, ReplayedHand: sense_replayed, Exchange: sense_exchange}
-_ACTUATE: dict[type, Any] = {
-    SimulatedPhantom: actuate_simulated, ReplayedHand: actuate_replayed, Exchange: actuate_exchange,
-}  # fmt: skip
-_ADVANCE: dict[type, Any] = {
-    SimulatedPhantom: advance_simulated, ReplayedHand: advance_replayed, Exchange: advance_exchange,
-}  # fmt: skip
+_KERNELS: dict[type, tuple[Any, Any, Any]] = {
+    SimulatedPhantom: (sense_simulated, actuate_simulated, advance_simulated),
+    ReplayedHand: (sense_replayed, actuate_replayed, advance_replayed),
+    Exchange: (sense_exchange, actuate_exchange, advance_exchange),
+}
+"""`sense`, `actuate` and `advance` of each device."""
 
 
 def sense(device: DeviceState, t: float) -> None:
     """Fill the device's hand vector with its reading at time t [s]."""
-    _SENSE[type(device)](device, t)
+    _KERNELS[type(device)][0](device, t)
 
 
 def actuate(device: DeviceState, force: Array) -> None:
     """Command a force on the hand [N], in H, shape (3,)."""
-    _ACTUATE[type(device)](device, force)
+    _KERNELS[type(device)][1](device, force)
 
 
 def advance(device: DeviceState, plant: Plant, t: float, replay: bool, applied: Array) -> None:
     """Step the world by one servo period; the user's torques are written to `applied`, or read from it in a replay."""
-    _ADVANCE[type(device)](device, plant, t, replay, applied)
+    _KERNELS[type(device)][2](device, plant, t, replay, applied)
 
 
 @overload(sense, strict=False)
 def _sense(device: Any, t: Any) -> Any:
-    return _SENSE[device.instance_class].py_func
+    return _KERNELS[device.instance_class][0].py_func
 
 
 @overload(actuate, strict=False)
 def _actuate(device: Any, force: Any) -> Any:
-    return _ACTUATE[device.instance_class].py_func
+    return _KERNELS[device.instance_class][1].py_func
 
 
 @overload(advance, strict=False)
 def _advance(device: Any, plant: Any, t: Any, replay: Any, applied: Any) -> Any:
-    return _ADVANCE[device.instance_class].py_func
+    return _KERNELS[device.instance_class][2].py_func
 
 
 @entry_point
@@ -89,6 +88,11 @@ def available_ticks(device: DeviceState) -> int | None:
 def first_reading(device: DeviceState) -> HandState | None:
     """First reading of a device if it is known before the run; otherwise None."""
     return HandState.of(device.rows[0]) if isinstance(device, ReplayedHand) else None
+
+
+def user_torques(device: DeviceState) -> int:
+    """Number of joints on which the user exerts torques: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
+    return 6 if isinstance(device, SimulatedPhantom) and len(device.user.arm.turns) > 0 else 3
 
 
 def measure_in_motion(device: DeviceState) -> None:

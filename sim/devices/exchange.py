@@ -59,11 +59,6 @@ class Exchange(NamedTuple):
     faults: Array
     force: Array
 
-    @property
-    def user_torques(self) -> int:
-        """Number of columns, here of zeros, in which a simulated hand's torques are recorded."""
-        return 3
-
 
 def exchange(world: World, cutoff: float, silent: float = SILENT_PERIODS) -> Exchange:
     """A device as two shared arrays; its force is ramped in from zero.

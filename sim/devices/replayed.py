@@ -41,11 +41,6 @@ class ReplayedHand(NamedTuple):
     faults: Array
     force: Array
 
-    @property
-    def user_torques(self) -> int:
-        """Number of columns, here of zeros, in which a simulated hand's torques are recorded."""
-        return 3
-
 
 def recorded_hand(recording: Recording) -> Array:
     """Hand vectors of a recording, shape (n, 15).

@@ -11,7 +11,7 @@ from sim.users.hand.arm import Arm
 from sim.users.person.person_state import PersonState
 from sim.users.person.person_step import link_person, person_unit
 from sim.world.phantom_port import PhantomPort, actuate, has_sensed, sense
-from sim.world.plant import Hand, Plant, advance, hand_torques, make_hand
+from sim.world.plant import Hand, Plant, advance, make_hand
 
 
 class SimulatedPhantom(NamedTuple):
@@ -48,11 +48,6 @@ class SimulatedPhantom(NamedTuple):
         """Set the address of its user's code; compiles the unit if it is not in the cache."""
         if self.user.person.numbers.size > 0:
             link_person(self.user.person)
-
-    @property
-    def user_torques(self) -> int:
-        """Number of joints on which the user exerts torques."""
-        return hand_torques(self.user)
 
 
 def simulated_phantom(port: PhantomPort, user: Arm | PersonState) -> SimulatedPhantom:

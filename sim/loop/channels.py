@@ -21,6 +21,7 @@ from models.mocap.motion.clip import pose_errors
 from sim.body.drive import KinematicFigure, NoFigure
 from sim.body.figure_state import REPORT_DOWN, REPORT_FLIES, REPORT_RESIDUAL, REPORT_SATURATED, FigureState
 from sim.body.robot import RobotState, tool_positions
+from sim.devices.device import user_torques
 from sim.loop.servo import FrameLog, Servo, TickLog
 from sim.recording.recorder import Group, Recorder
 from sim.world.world import World
@@ -51,7 +52,7 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
             hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
             user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
             trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
-            applied=np.zeros((ticks, plant.substeps, servo.device.user_torques)),
+            applied=np.zeros((ticks, plant.substeps, user_torques(servo.device))),
             residual=np.zeros((ticks, len(servo.figure.applied))), fault=np.zeros((ticks, 3)),
         ),
         FrameLog(

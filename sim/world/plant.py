@@ -86,11 +86,6 @@ def make_hand(user: Arm | PersonState) -> Hand:
     return Hand(arm.compiled(), *linear, np.zeros(4), np.zeros(3), np.zeros((3, 3)), np.zeros(3), person)
 
 
-def hand_torques(hand: Hand) -> int:
-    """Number of joints on which the hand exerts torques: θ1, θ2, θ3, and the gimbal's three if it turns the stylus."""
-    return 6 if len(hand.arm.turns) > 0 else 3
-
-
 @njit
 def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool, applied: Array) -> None:
     """Step the physics from time t for one servo period.
@@ -107,7 +102,7 @@ def advance(plant: Plant, port: PhantomPort, hand: Hand, t: float, replay: bool,
         Take the hand's torques from `applied` instead of computing them.
     applied : Array
         The hand's torques about θ1, θ2, θ3 at each physics step, τ = JᵀF [N m], and with six columns about the gimbal
-        joints, τ = AᵀM; written or read, shape (substeps, `hand_torques`).
+        joints, τ = AᵀM; written or read, shape (substeps, 3 or 6).
     """
     turning = applied.shape[1] > 3
     if not replay and is_silent(port.faults, t):

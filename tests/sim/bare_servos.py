@@ -13,7 +13,7 @@ from models.phantom.kinematics import encoder_reading, gimbal_reading
 from models.world.scene import SceneConfig
 from sim.body.drive import no_figure
 from sim.compilation.compiled import entry_point
-from sim.devices.device import DeviceState, actuate, read_device
+from sim.devices.device import DeviceState, actuate, read_device, user_torques
 from sim.devices.device import advance as advance_device
 from sim.devices.exchange import (
     READING_CLOCK,
@@ -89,7 +89,7 @@ class SteppedPhantom:
         self.device = simulated_phantom(phantom_port(world.model, world.data, world.config.servo_period, cutoff),
                                         arm or Arm())  # fmt: skip
         self.plant, self.ticks = make_plant(world), 0
-        self._applied = np.zeros((self.plant.substeps, self.device.user_torques))
+        self._applied = np.zeros((self.plant.substeps, user_torques(self.device)))
 
     def read(self) -> HandState:
         read_device(self.device, self.ticks * self.plant.period)

@@ -70,13 +70,9 @@ def _sine(a: Interval) -> Interval:
     return _cosine(_round_outwards(a.low - 0.5 * np.pi, a.high - 0.5 * np.pi))
 
 
-def _negate(a: Interval) -> Interval:
-    return Interval(-a.high, -a.low)
-
-
 _UNARY: dict[int, Callable[[Interval], Interval]] = {
-    ca.OP_NEG: _negate, ca.OP_SIN: _sine, ca.OP_COS: _cosine, ca.OP_SQ: _square, ca.OP_SQRT: _square_root,
-    ca.OP_TWICE: lambda a: _add(a, a), ca.OP_ASSIGN: lambda a: a,
+    ca.OP_SIN: _sine, ca.OP_COS: _cosine, ca.OP_SQ: _square, ca.OP_SQRT: _square_root,
+    ca.OP_NEG: lambda a: Interval(-a.high, -a.low), ca.OP_TWICE: lambda a: _add(a, a), ca.OP_ASSIGN: lambda a: a,
 }  # fmt: skip
 _BINARY: dict[int, Callable[[Interval, Interval], Interval]] = {
     ca.OP_ADD: _add, ca.OP_SUB: _subtract, ca.OP_MUL: _multiply, ca.OP_DIV: _divide,

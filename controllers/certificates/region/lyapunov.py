@@ -242,7 +242,7 @@ def find_form(axis: Axis, cell: Cell, limits: Limits, rate: float) -> Form | Non
     with raise_lost_interrupts():
         first = ca.nlpsol("first", "ipopt", {"x": ca.vertcat(x, s), "f": 10.0 * s + 0.1 * barrier}, options)
     start = np.concatenate(
-        [_initial_form(n), np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * N_CHANNELS, [1e5]]
+        [np.eye(n)[np.tril_indices(n)], np.zeros(entries), [0.0, 0.0, 1.0, 2.0, 0.0, 5.0], [1.0] * N_CHANNELS, [1e5]]
     )
     with raise_lost_interrupts():
         found = np.array(first(x0=start, lbx=np.append(np.full(x.numel(), -np.inf), -0.02))["x"]).ravel()
@@ -292,8 +292,3 @@ def _log_pivots(matrix: Any, shift: Any) -> list[Any]:
             for j in range(k + 1, len(rows)):
                 rows[i][j] = rows[i][j] - share * rows[k][j]
     return logs
-
-
-def _initial_form(n: int) -> Array:
-    rows, columns = np.tril_indices(n)
-    return np.where(rows == columns, 1.0, 0.0)

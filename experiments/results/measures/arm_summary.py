@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geometry.arrays import rms
 from models.robot_arm.spec import ARM_JOINTS, arm_limits, arm_model
 from sim.recording.recording import Recording
 
@@ -54,9 +55,9 @@ def arm_summary(recording: Recording) -> ArmSummary:
     limits = arm_limits(arm)
     room = np.minimum(joints - limits[:, 0], limits[:, 1] - joints)
     return ArmSummary(
-        tool_rms_mm=float(np.sqrt(np.mean(apart**2))),
+        tool_rms_mm=rms(apart),
         tool_max_mm=float(apart.max()),
-        joints_rms_deg=float(np.degrees(np.sqrt(np.mean((joints - reference) ** 2)))),
+        joints_rms_deg=float(np.degrees(rms(joints - reference))),
         torque_share=float((torque / arm.actuator_ctrlrange[:, 1]).max()),
         nearest_limit_deg=float(np.degrees(room.min())),
     )

@@ -20,7 +20,6 @@ from experiments.setups.maps.about_circle import Place, about_circle, motions_of
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
-from sim.compilation.sources import results_folder
 
 CORNERS = 4  # number of clips
 
@@ -71,8 +70,8 @@ def _cached_map(
 
     # The corrections do not depend on the radii and heights between which the clips blend.
     made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
-    folder = results_folder(CylindricalMap.__module__)
-    corrections = cached_array(folder, "corrections", made_of, (-1, *correction_shape(len(legs))), find)
+    shape = (-1, *correction_shape(len(legs)))
+    corrections = cached_array(CylindricalMap.__module__, "corrections", made_of, shape, find)
     return CylindricalMap(clips, radii, heights, legs, corrections, lap)
 
 

@@ -9,6 +9,7 @@ from geometry.arrays import Array
 from models.humanoid.skeleton import rest_pose
 from models.world.scene import SceneConfig
 from sim.compilation.compiled import entry_point
+from sim.devices.device import user_torques
 from sim.devices.simulated import (
     SimulatedPhantom,
     actuate_simulated,
@@ -113,7 +114,7 @@ def trial(
     n = round(seconds / PERIOD)
     rows, plant = np.zeros((n, 10)), make_plant(world)
     given = np.zeros((n, 3)) if pushes is None else pushes
-    rows = rows[: run_bare(device, plant, given, np.zeros((plant.substeps, device.user_torques)), rows, end)]
+    rows = rows[: run_bare(device, plant, given, np.zeros((plant.substeps, user_torques(device))), rows, end)]
     if fault := Fault(int(device.faults[FAULT_CODE])):
         reason = fault.words(float(device.faults[FAULT_VALUE]))
         raise SimError(f"the device let go of a person after {device.faults[FAULT_TIME]:.3f} s of a trial: {reason}")

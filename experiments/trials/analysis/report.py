@@ -15,7 +15,6 @@ from experiments.files.html_page import NUMBERS, html_page, image, sentences, sh
 from experiments.results.folder import RECORDING, world_of
 from experiments.trials.analysis.sentences import three_sentences
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
-from experiments.trials.analysis.trial_table import measured_columns
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
 from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES, TrialLog
@@ -191,7 +190,8 @@ def write_report(
     """
     import pandas as pd
 
-    measures = [name for name in measured_columns(frame) if name not in CONDITION_MEASURES]
+    own_measures = (name for name in MEASURES if name in frame and name not in CONDITION_MEASURES)
+    measures = [name for name in own_measures if frame[name].notna().any()]
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()

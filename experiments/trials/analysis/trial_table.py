@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyError
-from experiments.trials.trial.measures import CONDITION_MEASURES, MEASURES
+from experiments.trials.trial.measures import CONDITION_MEASURES
 from experiments.trials.trial.run_trial import Row
 from geometry.whole_files import atomic_file, write_text
 
@@ -65,8 +65,3 @@ def write_table(frame: Any, folder: Path) -> None:
     except ImportError:
         raise StudyError(_INSTALL_HINT) from None
     write_text(folder / TABLE_CSV, frame.to_csv(index=False))
-
-
-def measured_columns(frame: Any) -> list[str]:
-    """Measures of a table that have a value in some trial."""
-    return [name for name in MEASURES if name in frame and frame[name].notna().any()]

@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 
+from experiments.files import array_cache
 from experiments.files.array_cache import cached_array
 
 SHAPE = (4, 3, 2)
@@ -13,8 +14,9 @@ INPUTS = (np.arange(5.0), np.array([2], dtype=np.uint8))
 
 
 @pytest.fixture
-def cached(tmp_path):
+def cached(tmp_path, monkeypatch):
     """Calls `cached_array` and counts how often the array was computed."""
+    monkeypatch.setattr(array_cache, "results_folder", lambda module: tmp_path / module)
 
     class Keeper:
         folder, found = tmp_path / "cache", 0
@@ -24,7 +26,7 @@ def cached(tmp_path):
                 self.found += 1
                 return values
 
-            return cached_array(self.folder, "sway", made_of, SHAPE, find)
+            return cached_array("cache", "sway", made_of, SHAPE, find)
 
         @property
         def files(self):
@@ -56,9 +58,11 @@ def test_corrupted_cache_file_is_recomputed(cached):
         assert path.read_bytes() == good
 
 
-def test_unspecified_row_count_accepts_only_whole_rows(tmp_path):
+def test_unspecified_row_count_accepts_only_whole_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr(array_cache, "results_folder", lambda module: tmp_path / module)
+
     def cached(values, shape):
-        return cached_array(tmp_path, "table", INPUTS, shape, lambda: values)
+        return cached_array("cache", "table", INPUTS, shape, lambda: values)
 
     np.testing.assert_array_equal(cached(VALUES, (-1, *SHAPE[1:])), VALUES)
     np.testing.assert_array_equal(cached(2.0 * VALUES, (-1, *SHAPE[1:])), VALUES)

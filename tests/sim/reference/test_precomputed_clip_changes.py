@@ -14,6 +14,7 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER, TRANSITION
 from controllers.state import stylus_path
 from experiments.config.options import run_config
+from experiments.files import array_cache
 from experiments.fitting import hand_tours, river_changes
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
@@ -106,7 +107,7 @@ def test_change_without_precomputed_passage_goes_by_offsets(
 def test_map_is_unchanged_where_no_change_is_found(
     map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(river_changes, "results_folder", lambda module: tmp_path)
+    monkeypatch.setattr(array_cache, "results_folder", lambda module: tmp_path)
     # Other processes would not see the patched `_make_passage`.
     monkeypatch.setattr(river_changes, "run_in_workers", lambda calls: [call(*given) for call, given in calls])
     monkeypatch.setattr(river_changes, "_make_passage", lambda *rest: None)
