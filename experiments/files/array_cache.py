@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry.arrays import Array
-from sim.compilation.hashed_files import read_hashed, write_hashed
+from geometry.whole_files import read_hashed, write_hashed
 from sim.compilation.sources import results_folder
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from controllers.certificates.flight.ballistic import BodyMotion, FlightJudgement, ballistic_verdict, judge_flights
 from controllers.certificates.flight.contact import BodyContact, contact_doubts
 from controllers.certificates.flight.flight_fit import FlightFit, find_flights, fit_free_fall
-from controllers.certificates.flight.rate_bounds import ANY_RATE, RateBounds, rate_bounds, turns_verdict
+from controllers.certificates.flight.rate_bounds import RateBounds, rate_bounds, turns_verdict
 from controllers.certificates.flight.tolerance import DEFAULT_CRITERIA, JudgementCriteria
 from controllers.certificates.report import Certificate, Verdict, hash_of, hashes_of
 from experiments.files.certificate_files import clip_inputs
@@ -59,23 +59,6 @@ class ClipBallistics:
     flights: tuple[FlightJudgement, ...]
     bounds: RateBounds
     certificate: Certificate
-
-    def lines(self) -> tuple[str, ...]:
-        """The verdicts and the admissible rates in words, a line each."""
-        verdicts = [f"{name}: {found.verdict}; {found.reason}" for name, found in self.certificate.verdicts.items()]
-        rates = [
-            f"flight at {flight.fit.time:.2f} s: seen as natural {_rates_text(flight.seen)} of its speed, can be done "
-            f"{_rates_text(flight.done)}; true gravity requires a take-off at {flight.fit.take_off_speed:.2f} m/s, "
-            f"recorded {flight.fit.take_off[2]:.2f}"
-            for flight in self.flights
-        ]
-        return (*verdicts, *rates)
-
-
-def _rates_text(rates: tuple[float, float] | None) -> str:
-    if rates is None or not np.isfinite(rates[0]):
-        return "at no rate"
-    return f"at {rates[0]:.2f} or more" if rates[1] > ANY_RATE else f"at {rates[0]:.2f} to {rates[1]:.2f}"
 
 
 class FlightTrial(NamedTuple):

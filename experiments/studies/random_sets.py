@@ -6,7 +6,6 @@ prints the table of `docs/validation/blended-motions.md`; ``--files NAME...`` dr
 Rows are written as they come, one JSON object a line.
 """
 
-import argparse
 import json
 import time
 from collections.abc import Sequence
@@ -15,9 +14,10 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import tyro
 
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
@@ -179,45 +179,37 @@ def summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-SIZES = {"cylindrical": 4, "composite": 3, "rivers": 3, "lifted": 4}
+MapKind = Literal["cylindrical", "composite", "rivers", "lifted"]
+SIZES: dict[MapKind, int] = {"cylindrical": 4, "composite": 3, "rivers": 3, "lifted": 4}
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder")
-    parser.add_argument("--half", choices=("tuning", "judging"), default="tuning")
-    parser.add_argument("--files", nargs="+", help="in the folder, in place of a half")
-    parser.add_argument("--sets", type=int, default=10)
-    parser.add_argument("--maps", nargs="+", default=["cylindrical"], choices=tuple(SIZES))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--user", default="push")
-    parser.add_argument("--out", type=Path, required=True)
-    given = parser.parse_args()
-    files = given.files or (TUNING if given.half == "tuning" else JUDGING)
+def main(  # noqa: PLR0913 - the options of the command line
+    folder: tyro.conf.Positional[str], out: Path, half: Literal["tuning", "judging"] = "tuning",
+    files: tuple[str, ...] = (), sets: int = 10, maps: tuple[MapKind, ...] = ("cylindrical",), seed: int = 1,
+    processes: int = 1, user: str = "push",
+) -> None:  # fmt: skip
+    """Print the table; `files` in the folder are taken in place of a half."""
+    files = files or (TUNING if half == "tuning" else JUDGING)
     clips: list[Clip] = []
-    with ProcessPoolExecutor(given.processes) as pool, given.out.open("w") as out:
-        for found, clip in pool.map(captured, [given.folder] * len(files), files):
+    with ProcessPoolExecutor(processes) as pool, out.open("w") as written:
+        for found, clip in pool.map(captured, [folder] * len(files), files):
             print(f"{found.name}: {found.reason or 'drawn'} (alone {100 * found.alone:.1f} %)", flush=True)
             if clip is not None and not found.reason:
                 clips.append(clip)
         rows: list[dict[str, Any]] = []
         tasks = [
-            pool.submit(run_set, k, kind, chosen, given.seed + k, given.user, given.folder)
-            for k, sets in enumerate(
-                islice(zip(*(drawn(clips, SIZES[m], given.seed) for m in given.maps), strict=True), given.sets)
-            )
-            for kind, chosen in zip(given.maps, sets, strict=True)
+            pool.submit(run_set, k, kind, chosen, seed + k, user, folder)
+            for k, each in enumerate(islice(zip(*(drawn(clips, SIZES[m], seed) for m in maps), strict=True), sets))
+            for kind, chosen in zip(maps, each, strict=True)
         ]
         for task in as_completed(tasks):
             row = task.result()
             rows.append(row)
-            out.write(json.dumps(row) + "\n")
-            out.flush()
+            written.write(json.dumps(row) + "\n")
+            written.flush()
             print(row["set"], row["map"], row["fell"], round(100 * row["residual"], 1), row["clips"], flush=True)
     print("\n".join(summary(rows)))
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main)

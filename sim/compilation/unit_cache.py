@@ -22,8 +22,8 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from geometry.whole_files import read_hashed, write_hashed
 from sim.compilation.deferred_codegen import is_nested, referred_by_name
-from sim.compilation.hashed_files import read_hashed, write_hashed
 from sim.compilation.unit_key import unit_key
 
 _SUFFIX = ".unit"

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numba import njit
 
+from geometry.whole_files import read_hashed, write_hashed
 from sim.compilation import unit_cache
 from sim.compilation.compiled import entry_point
-from sim.compilation.hashed_files import read_hashed, write_hashed
 from sim.compilation.unit_cache import is_sound, remove_forgotten
 
 ROOT = Path(unit_cache.__file__).parent.parent
