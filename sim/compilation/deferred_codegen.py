@@ -11,13 +11,12 @@ This patches numba's internals. With an untested version numba is left unpatched
 # The patched attributes are private to numba; TESTED lists the versions for which they are known.
 
 import gc
-from functools import cache
 from typing import Any
 from weakref import WeakValueDictionary
 
 import numba
 from llvmlite import ir
-from numba.core import base, codegen, cpu, dispatcher, sigutils, targetconfig
+from numba.core import base, codegen, cpu, dispatcher, sigutils
 from numba.core.environment import lookup_environment
 
 from sim.compilation.lost_interrupts import reraise_lost_interrupts
@@ -172,7 +171,6 @@ def install() -> bool:
         _count_depth()
         _spare_wrappers()
         _compile_anew_for_python()
-        _compare_flags_quickly()
     return True
 
 
@@ -225,30 +223,6 @@ def _set_environments(library: UnitLibrary) -> None:
         environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
         if environment is not None and library.codegen._engine.get_global_value_address(variable.name):
             library.codegen.set_env(variable.name, environment)
-
-
-def _compare_flags_quickly() -> None:
-    """Compare and hash flags by their values alone: numba reads twenty properties for each of 70 000 comparisons."""
-    kind = targetconfig.TargetConfig
-
-    @cache
-    def defaults(flags: Any) -> dict[str, Any]:
-        return {name: option.default for name, option in flags.options.items()}
-
-    @cache
-    def hash_of_names(flags: Any) -> int:  # numba's own hash, which has no values
-        return hash(tuple(sorted(flags.options)))
-
-    def values(self: Any) -> dict[str, Any]:
-        return defaults(type(self)) | self._values
-
-    def equal(self: Any, other: Any) -> bool:
-        return self is other or (isinstance(other, kind) and values(self) == values(other))
-
-    def hash_of(self: Any) -> int:
-        return hash_of_names(type(self))
-
-    kind.values, kind.__eq__, kind.__hash__ = values, equal, hash_of
 
 
 def _compile_anew_for_python() -> None:

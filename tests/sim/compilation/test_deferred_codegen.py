@@ -1,7 +1,6 @@
 """Code generation deferred to the unit: the same results, errors and addresses, and no undefined symbols."""
 
 import gc
-import itertools
 import math
 import subprocess
 import sys
@@ -11,7 +10,6 @@ import numba
 import numpy as np
 import pytest
 from numba import njit, types
-from numba.core.compiler import DEFAULT_FLAGS, Flags
 from numba.core.errors import TypingError
 
 from sim.compilation import deferred_codegen
@@ -55,25 +53,6 @@ def test_install_succeeds_for_the_pinned_numba_version():
     assert any(numba.__version__.startswith(version + ".") for version in TESTED)
     pinned = Path(deferred_codegen.__file__).parents[2] / "pyproject.toml"
     assert '"numba>=0.68,<0.69"' in pinned.read_text(encoding="utf-8")
-
-
-def test_flags_compare_and_hash_as_in_numba():
-    install()
-    constructors = (Flags, DEFAULT_FLAGS.copy, lambda: _with("fastmath", True), lambda: _with("error_model", "numpy"))
-    for a, b in itertools.product([kind() for kind in constructors], repeat=2):
-        # What numba's own `values` would give: every option's property.
-        options, others = ({name: getattr(flags, name) for name in flags.options} for flags in (a, b))
-        assert list(a.values().items()) == list(options.items())
-        assert (a == b) == (options == others)
-        assert hash(a) == hash(tuple(sorted(options)))
-    assert _with("fastmath", True) != Flags()
-    assert Flags() != "flags"
-
-
-def _with(name, value):
-    flags = Flags()
-    setattr(flags, name, value)
-    return flags
 
 
 def test_gc_threshold_is_restored_after_compilation_and_after_its_failure():
