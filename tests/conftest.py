@@ -96,11 +96,11 @@ def _compile_or_load(self: Any, signature: Any) -> Any:
     return _compile(self, signature)
 
 
-def _compile_missing(calls: list[Call], done: Callable[[int], None], first: Callable[[], None] | None) -> None:
+def _compile_missing(calls: list[Call], done: Callable[[int], None]) -> None:
     with _exclusively("units"):
         missing = [k for k, (_, (unit,)) in enumerate(calls) if not unit.is_kept()]
         if missing:
-            run_in_workers([calls[k] for k in missing], lambda k: done(missing[k]), first)
+            run_in_workers([calls[k] for k in missing], lambda k: done(missing[k]))
 
 
 unit_workers.run_in_workers = _compile_missing

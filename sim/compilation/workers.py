@@ -22,9 +22,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 Call = tuple[Callable[..., object], tuple[Any, ...]]
 
 
-def run_in_workers(
-    calls: Sequence[Call], done: Callable[[int], None] = lambda number: None, first: Callable[[], None] | None = None
-) -> None:
+def run_in_workers(calls: Sequence[Call], done: Callable[[int], None] = lambda number: None) -> None:
     """Make calls in parallel for their side effects, such as filling a cache. Failures are ignored.
 
     A caller that repeats a failed call gets its exception.
@@ -35,8 +33,6 @@ def run_in_workers(
         Functions of modules, with arguments that can be pickled.
     done : callable
         Called with the number of each call that succeeded.
-    first : callable or None
-        A function of a module that is called once, before the workers are forked.
     """
     # Use the sources of this project, whatever the working directory is.
     path = os.pathsep.join([str(_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -47,7 +43,7 @@ def run_in_workers(
     ) as process:  # fmt: skip
         assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write(pickle.dumps((calls, first)))
+        process.stdin.write(pickle.dumps(calls))
         process.stdin.close()
         for line in process.stdout:
             done(int(line))
@@ -69,11 +65,9 @@ def _make_call(numbered: tuple[int, Call]) -> tuple[int, bool]:
     return number, True
 
 
-def _run_calls(calls: Sequence[Call], first: Callable[[], None] | None) -> None:
+def _run_calls(calls: Sequence[Call]) -> None:
     start_methods = multiprocessing.get_all_start_methods()
     context = multiprocessing.get_context("fork" if "fork" in start_methods else "spawn")
-    if first is not None:
-        first()
     gc.freeze()  # keeps the pages of imported modules shared between the workers
     with context.Pool(min(len(calls), processors()), maxtasksperchild=1) as pool:
         for number, succeeded in pool.imap_unordered(_make_call, enumerate(calls)):
@@ -82,4 +76,4 @@ def _run_calls(calls: Sequence[Call], first: Callable[[], None] | None) -> None:
 
 
 if __name__ == "__main__":
-    _run_calls(*pickle.load(sys.stdin.buffer))
+    _run_calls(pickle.load(sys.stdin.buffer))
