@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry.arrays import Mask
-from models.mocap.motion.spans import spans
+from geometry.spans import spans
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.broken_frames import MAX_GAP_TIME, MIN_FRAME_COUNT, interpolated
 
