@@ -69,6 +69,13 @@ def tour_of_domain(haptic_map: Cylindrical | Composite, lap: float, parallel: bo
     return Clip(poses_about_circle(haptic_map, r, 2.0 * np.pi / lap * elapsed, z), FPS, "blend")
 
 
+def lap_left_alone(haptic_map: Cylindrical | Composite, lap: float) -> Clip:
+    """The animation of a hand that goes round in the middle of a map's domain; it lasts as long as `tour_of_domain`."""
+    times = _times(tour_duration(lap))
+    r, z = domain(haptic_map).mean(axis=1)
+    return Clip(poses_about_circle(haptic_map, r, 2.0 * np.pi / lap * times, z), FPS, "blend")
+
+
 def tour_along_curve(haptic_map: Lifted, curve: Trajectory, keeps_pace: bool) -> Clip:
     """The animation of a hand that moves along a curve of a map at its pace and is pushed outwards and inwards.
 

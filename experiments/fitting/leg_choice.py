@@ -5,7 +5,8 @@ them, so simulation decides: for the legs of each clip in turn, the physical fig
 hand wanders through the whole domain and pushes. The first clip in the user's order that is followed well is taken, or
 else the best one. If the figure falls with the best, or its residual is too large, the other clips' arms are blended in
 with a smaller share λ, down to 0, where the clip plays alone. Legs that skate, penetrate the floor or exceed joint
-ranges are tried last. If nothing is followed well enough, a remark says so.
+ranges are tried last. If nothing is followed well enough, a remark says so, and the first is taken that the figure
+follows while the hand is left alone: when a push makes it fall does not tell which of them stands without one.
 
 Curves of a lifted map lie some 10 mm apart, and a push of 2.5 N moves the hand by 8 mm within 0.15 s, at any moment of
 the lap and not only where motions agree. If the figure does not follow the whole map, or its feet skate, its legs and
@@ -23,7 +24,13 @@ from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
-from experiments.fitting.hand_tours import domain, tour_along_curve, tour_duration, tour_of_domain
+from experiments.fitting.hand_tours import (
+    domain,
+    lap_left_alone,
+    tour_along_curve,
+    tour_duration,
+    tour_of_domain,
+)
 from experiments.fitting.verdict import TRIAL_SECONDS, Trial, Verdict
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
@@ -48,10 +55,25 @@ def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) ->
     return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), tour_duration(lap), made_of)
 
 
+def stands_left_alone(haptic_map: Cylindrical | Composite, lap: float) -> bool:
+    """Whether the physical figure follows a map well enough while the hand is not pushed; needs compiled code."""
+    made_of = (haptic_map.compiled().params, np.array([lap, *domain(haptic_map).ravel()]))
+    trial = Trial(__name__, lambda: lap_left_alone(haptic_map, lap), tour_duration(lap), made_of)
+    return trial.verdict().acceptable
+
+
 def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
     """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
     verdict = trial_of(haptic_map, lap, parallel).verdict()
-    return () if verdict.acceptable else (f"the physical figure {verdict} with {name} at this lap",)
+    if verdict.acceptable:
+        return ()
+    return (_remark(verdict, f"{name} at this lap", stands_left_alone(haptic_map, lap)),)
+
+
+def _remark(verdict: Verdict, what: str, stands: bool) -> str:
+    """Remark on a map that is not followed well enough by a hand that pushes; `stands`: it is without pushes."""
+    when, otherwise = ("pushed, ", "; left alone it stands") if stands else ("", "")
+    return f"{when}the physical figure {verdict} with {what}{otherwise}"
 
 
 def select_legs(
@@ -89,7 +111,16 @@ def select_legs(
                     best, name, best_verdict, least_gain = haptic_map, names[i], verdict, 0.0
             if best_verdict.acceptable and (best_verdict.residual <= _SAFE_RESIDUAL or share <= _LEAST_SHARE):
                 return best, ()
-    return best, (f"the physical figure {best_verdict} with the legs of {name}, the best found at this lap",)
+    found = f"the legs of {name}, the best found at this lap"
+    if stands_left_alone(best, lap):
+        return best, (_remark(best_verdict, found, stands=True),)
+    for share in (1.0, 0.0) if best_verdict.falls else ():
+        for i in sorted(range(len(names)), key=has_sound_legs, reverse=True):
+            haptic_map = map_with_legs(i).with_share(share)
+            if stands_left_alone(haptic_map, lap):
+                verdict = trial_of(haptic_map, lap, parallel).verdict()
+                return haptic_map, (_remark(verdict, f"the legs of {names[i]}", stands=True),)
+    return best, (_remark(best_verdict, found, stands=False),)
 
 
 def followed_map(

@@ -1,5 +1,6 @@
 """The choice of the clip whose legs carry the arms of the others, by trials of the physical figure."""
 
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -28,9 +29,13 @@ def maps() -> list[Cylindrical]:
 
 
 def set_verdicts(
-    monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int]
-) -> list[object]:
-    """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials."""
+    monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int],
+    alone: Sequence[tuple[int, float]] = (),
+) -> list[object]:  # fmt: skip
+    """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials.
+
+    `alone` are those that stand while the hand is left alone.
+    """
     trials: list[object] = []
 
     def verdict(trial: Trial) -> Verdict:
@@ -39,6 +44,9 @@ def set_verdicts(
         return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
 
     monkeypatch.setattr(leg_choice, "tour_of_domain", lambda haptic_map, *_: haptic_map)
+    monkeypatch.setattr(
+        leg_choice, "stands_left_alone", lambda haptic_map, _: (haptic_map.legs_of, haptic_map.share) in alone
+    )
     monkeypatch.setattr(Trial, "verdict", verdict)
     monkeypatch.setattr(Trial, "is_sound", lambda trial: trial.show().legs_of in fit)
     return trials
@@ -102,6 +110,28 @@ def test_unbearable_map_is_reported_with_the_best_legs(
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
         "the physical figure has a residual of 14 % of weight with the legs of walk"
     )
+
+
+def test_legs_that_stand_while_the_hand_is_left_alone_are_chosen_if_all_fall_when_it_pushes(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hopscotch at 1.7 times its pace fell later in a push than a jog at its own, which stands without pushes."""
+    verdicts = {(0, 1.0): Verdict(0.3, 5.5), (1, 1.0): Verdict(0.2, 4.8), (1, 0.0): Verdict(0.1, 4.7)}
+    set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3}, alone=[(1, 0.0), (2, 0.0)])
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
+    assert (best.legs_of, best.share) == (1, 0.0)
+    assert remarks == ("pushed, the physical figure falls at 4.7 s with the legs of walk; left alone it stands",)
+    set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3}, alone=[(0, 1.0), (1, 0.0)])
+    best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
+    assert (best.legs_of, best.share) == (0, 1.0)
+    assert remarks[0].endswith("with the legs of run, the best found at this lap; left alone it stands")
+
+
+def test_legs_that_no_push_fells_are_kept_though_others_need_less_when_the_hand_is_left_alone(
+    maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.14, NEVER)}, {0, 1, 2, 3}, alone=[(1, 1.0)])
+    assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
 def toured(haptic_map: Cylindrical, lap: float, parallel: bool, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
