@@ -23,7 +23,7 @@ from controllers.work_array import work_array
 from geometry.arrays import Array
 
 _CLIPS = 4
-_ORDINALS = ("first", "second", "third", "fourth")
+_CLIP_NAMES = ("the first clip", "the second clip", "the third clip", "the fourth clip")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _LEGS_OF, _SHARE, _TABLE_SIZE, _TABLE = range(8)
 # Nodes of the table of corrections along each of r and z: a blend of cheer and ginga slides 1.0 cm, also with 9 and 17;
 # one of walk, run, ginga and cheer, which no map blends as a whole, slides 7.5 cm, with 9 and 17 nodes 6.0 and 5.4 cm.
@@ -128,6 +128,8 @@ class Cylindrical(AnimationMap):
         The only joints that are blended, counted from 1; by default all.
     legs_of : int
         With `upper`, the clip that gives legs and root, counted from 0.
+    called : sequence of four str
+        What remarks call the clips.
 
     Attributes
     ----------
@@ -159,6 +161,7 @@ class Cylindrical(AnimationMap):
         lap: float | None = None,
         upper: Sequence[int] = (),
         legs_of: int = 0,
+        called: Sequence[str] = _CLIP_NAMES,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -168,7 +171,7 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, AXIS), *checked_interval("z_range", z_range, -np.inf))
         if not 0 <= legs_of < _CLIPS:
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
-        self.upper, self.legs_of = tuple(upper), legs_of
+        self.upper, self.legs_of, self._called = tuple(upper), legs_of, tuple(called)
         legs = 1.0 + legs_of if self.upper else 0.0
         super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
@@ -204,8 +207,7 @@ class Cylindrical(AnimationMap):
         """A remark if only some joints are blended."""
         if not self.upper:
             return ()
-        owner = _ORDINALS[self.legs_of]
-        remark = f"the clips are too different to average, so legs and trunk are the {owner} clip's"
+        remark = f"the clips are too different to average, so legs and trunk are those of {self._called[self.legs_of]}"
         if self.share < 1.0:
             remark += f", with {arms_of_others(self.share)}"
         return (remark,)
