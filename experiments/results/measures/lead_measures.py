@@ -19,6 +19,7 @@ from sim.recording.recording import Recording
 
 # [m] and [rad] weighted equally in the search for the nearest earlier pose
 _DISTANCE_SCALE, _TURN_SCALE = 0.01, math.radians(2.0)
+_LEAST_LIMITED = 0.05  # [N] difference of the force from the field's that counts: ramps and rounding are smaller
 _MAX_STORED_POSES = 6000  # poses of the outward path that are kept, one per centimetre
 
 
@@ -33,7 +34,9 @@ class LeadSummary:
     turn_deg_per_s : tuple of three float
         Largest turn rates of the path while the figure went along it on no foot, on one foot and on two.
     force_max : float
-        Largest force of the field in the horizontal plane [N].
+        Largest force that the hand felt in the horizontal plane [N].
+    limited_s : float
+        For how long the field asked for more than the motors bear [s].
     slide_cm : float
         Largest slide of a point of the animation's soles while in contact (`Soles`).
     physical_slide_cm : float or None
@@ -48,6 +51,7 @@ class LeadSummary:
     length_m: float
     turn_deg_per_s: tuple[float, float, float]
     force_max: float
+    limited_s: float
     slide_cm: float
     physical_slide_cm: float | None
     retrace_cm: float | None
@@ -67,6 +71,11 @@ class LeadSummary:
                     f"{self.physical_retrace_deg:.1f}°"
                 )
             back += "."
+        limited = (
+            f"; for {self.limited_s:.1f} s the field asked for more than the motors bear"
+            if self.limited_s > 0.0
+            else ""
+        )
         slid = (
             ""
             if self.physical_slide_cm is None
@@ -75,7 +84,7 @@ class LeadSummary:
         return [
             f"The figure was led {self.length_m:.1f} m, turning by up to {two:.0f}°/s on two feet, {one:.0f}°/s on one "
             f"and {none:.0f}°/s on none; its soles slid by up to {self.slide_cm:.1f} cm{slid}.",
-            f"{back} The hand felt up to {self.force_max:.1f} N.",
+            f"{back} The hand felt up to {self.force_max:.1f} N{limited}.",
         ]
 
 
@@ -87,15 +96,17 @@ def lead_summary(
     every = round(recording.rates["ticks"] / recording.rates["frames"])
     root = frames["qpos"].shape[1] - N_POSE
     soles, pressing, shown, physical = Soles(scene), Soles(scene, physical=True), _Retrace(), _Retrace()
-    farthest, force, turns = -math.inf, 0.0, np.zeros(3)
+    farthest, force, limited, turns = -math.inf, 0.0, 0, np.zeros(3)
     for first in range(0, len(frames["t"]), BLOCK_FRAMES):
         rows = slice(first, first + BLOCK_FRAMES)
         t, reference, poses = frames["t"][rows], frames["reference"][rows], frames["qpos"][rows][:, root:]
         s = ticks["phase"][first * every : (first + len(t)) * every : every]
         if len(t) > 1:
             turns = np.maximum(turns, turn_rates(gait, walkers, s, np.gradient(s, t)))
-        forces = ticks["field"][first * every : (first + len(t)) * every][:, :2]
-        force = max(force, float(np.max(np.linalg.norm(forces, axis=1), initial=0.0)))
+        span = slice(first * every, (first + len(t)) * every)
+        felt, asked = ticks["force"][span], ticks["field"][span][:, :3]
+        force = max(force, float(np.linalg.norm(felt[:, :2], axis=1).max(initial=0.0)))
+        limited += int(np.count_nonzero(np.linalg.norm(asked - felt, axis=1) > _LEAST_LIMITED))
         soles.add(reference)
         shown.add(s, reference, farthest)
         if figure is not None:
@@ -105,8 +116,8 @@ def lead_summary(
         farthest = max(farthest, float(s.max()))
     none, one, two = (math.degrees(rate) for rate in turns)
     return LeadSummary(
-        farthest, (none, one, two), force, 100.0 * soles.slide, None if figure is None else 100.0 * pressing.slide,
-        *shown.result(), *physical.result(),
+        farthest, (none, one, two), force, limited / recording.rates["ticks"], 100.0 * soles.slide,
+        None if figure is None else 100.0 * pressing.slide, *shown.result(), *physical.result(),
     )  # fmt: skip
 
 

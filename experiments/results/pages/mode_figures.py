@@ -26,10 +26,10 @@ def lead_figure(recording: Recording) -> Figure:
     turned = int(np.argmax(s))
     _draw_paths(above, recording, stride, turned)
     _draw_speed(moving, recording, t, s)
-    force = recording.channel("ticks", "field")[: n * every : every * stride]
+    force = recording.channel("ticks", "force")[: n * every : every * stride]
     for axis, colour in enumerate(AXES):
         feeling.plot(t, force[:, axis], color=colour, lw=0.8, label=f"along {'xyz'[axis]}")
-    feeling.set(title="force of the field on the hand", xlabel="time [s]", ylabel="F [N]", xlim=(t[0], t[-1]))
+    feeling.set(title="force on the hand", xlabel="time [s]", ylabel="F [N]", xlim=(t[0], t[-1]))
     moving.tick_params(labelbottom=False)
     for ax in (moving, feeling):
         ax.axvline(t[turned], color=CURVE, lw=0.8, ls=":", label="it turns back" if ax is moving else None)

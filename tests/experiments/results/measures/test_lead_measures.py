@@ -1,6 +1,7 @@
 """Measures of a led run on motions with known answers, and refused configurations of the lead mode."""
 
 from pathlib import Path
+from typing import ClassVar, cast
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
 from experiments.fitting.figure_legs import figure_legs
 from experiments.preparation.prepared_clip import PreparedClip
-from experiments.results.measures.lead_measures import LeadSummary, _Retrace, support_at
+from experiments.results.measures.lead_measures import LeadSummary, _Retrace, lead_summary, support_at
 from experiments.results.measures.soles import Soles
 from experiments.setups.modes.lead import lead_parts, leading, walker_argument
 from experiments.setups.parts import clips
@@ -27,6 +28,7 @@ from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.world.scene import SceneConfig
+from sim.recording.recording import Recording
 from sim.world.world import phantom_angles
 
 GAIT = Gait(1.4, 1.25, np.repeat([2, 1, 2, 1], [18, 48, 18, 48]), 0.45)
@@ -180,7 +182,7 @@ def test_clip_with_long_leaps_is_led_by_grounded_steps() -> None:
 
 
 def test_lead_summary_lines() -> None:
-    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, 0.2, 0.1, 2.0, 1.0)
+    summary = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 0.0, 1.5, 2.5, 0.2, 0.1, 2.0, 1.0)
     assert summary.lines() == [
         "The figure was led 6.3 m, turning by up to 55°/s on two feet, 41°/s on one and 0°/s on none; its soles slid "
         "by up to 1.5 cm, the physical figure's by up to 2.5 cm.",
@@ -188,8 +190,39 @@ def test_lead_summary_lines() -> None:
         "The hand felt "
         "up to 1.1 N.",
     ]
-    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 1.5, 2.5, None, None, None, None)
-    assert never.lines()[1].startswith("The figure was not led back.")
+    never = LeadSummary(6.3, (0.0, 41.0, 55.0), 1.1, 12.34, 1.5, 2.5, None, None, None, None)
+    assert never.lines()[1] == (
+        "The figure was not led back. The hand felt up to 1.1 N; for 12.3 s the field asked for more than the motors "
+        "bear."
+    )
+
+
+class _Recording:
+    """A led run of a second whose motors give half of the field's force from 0.5 s on."""
+
+    rates: ClassVar = {"ticks": 1000.0, "frames": 500.0}
+
+    def __init__(self) -> None:
+        t, s = 1e-3 * np.arange(1000), 1e-3 * np.arange(1000)
+        field = np.tile([3.0, 4.0, 1.0, 0.0, 0.0, 0.0], (1000, 1))
+        force = field[:, :3] * np.where(t < 0.5, 1.0, 0.5)[:, None]
+        poses = poses_along(s[::2])
+        self.groups = {
+            "ticks": {"phase": s, "field": field, "force": force},
+            "frames": {"t": t[::2], "reference": poses, "qpos": poses},
+        }
+
+
+def test_led_hand_feels_what_the_motors_give_not_what_the_field_asks_for() -> None:
+    """A slow walk that could not follow asked for 7.4 N; the motors gave 4.6 N and, once warm, 1.5 N."""
+    recording, walking = _Recording(), leading(Lead(), GAIT).walking
+    summary = lead_summary(cast(Recording, recording), GAIT, walking.fresh(), SceneConfig(), None)
+    assert summary.force_max == pytest.approx(5.0)
+    assert summary.limited_s == pytest.approx(0.5)
+    recording.groups["ticks"]["force"] *= np.where(np.arange(1000) < 500, 0.2, 1.0)[:, None]
+    assert lead_summary(
+        cast(Recording, recording), GAIT, walking.fresh(), SceneConfig(), None
+    ).force_max == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize(

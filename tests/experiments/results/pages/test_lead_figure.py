@@ -21,13 +21,13 @@ def figure(tmp_path):
     poses = np.tile(rest_pose(), (len(rows), 1))
     poses[:, 0] = s[::10]
     groups = {
-        "ticks": Group(1000, {"phase": (), "p": (3,), "field": (6,)}),
+        "ticks": Group(1000, {"phase": (), "p": (3,), "force": (3,)}),
         "frames": Group(100, {"t": (), "qpos": (76,), "reference": (75,)}),
     }
     static = {"lead_scale": 100.0, "lead_stride": 1.0, "lead_support": np.repeat([2.0, 1.0, 0.0, 1.0], 25)}
     with Recorder(tmp_path / "run.h5", {}, 1, groups, static) as recorder:
-        hand, force = np.outer(s + 0.5, [0.01, 0.0, 0.0]), np.outer(np.sin(t), [1.0, 2.0, 3.0, 0.0, 0.0, 0.0])
-        recorder.append("ticks", {"phase": s, "p": hand, "field": force})
+        hand, force = np.outer(s + 0.5, [0.01, 0.0, 0.0]), np.outer(np.sin(t), [1.0, 2.0, 3.0])
+        recorder.append("ticks", {"phase": s, "p": hand, "force": force})
         recorder.append("frames", {"t": rows, "qpos": np.hstack((0.0 * poses[:, :1], poses)), "reference": poses})
         recorder.close({})
     with Recording(tmp_path / "run.h5") as recording, mpl.rc_context(STYLE):
