@@ -128,8 +128,6 @@ class Cylindrical(AnimationMap):
         The only joints that are blended, counted from 1; by default all.
     legs_of : int
         With `upper`, the clip that gives legs and root, counted from 0.
-    called : sequence of four str
-        What remarks call the clips.
 
     Attributes
     ----------
@@ -141,6 +139,8 @@ class Cylindrical(AnimationMap):
         ξ of each clip.
     share : float
         λ (see `with_share`).
+    called : tuple of four str
+        What remarks call the clips; it may be set.
 
     Raises
     ------
@@ -150,6 +150,7 @@ class Cylindrical(AnimationMap):
 
     map_kernel = staticmethod(cylindrical_map)
     share_at = _SHARE
+    called: tuple[str, ...] = _CLIP_NAMES
 
     def __init__(
         self,
@@ -161,7 +162,6 @@ class Cylindrical(AnimationMap):
         lap: float | None = None,
         upper: Sequence[int] = (),
         legs_of: int = 0,
-        called: Sequence[str] = _CLIP_NAMES,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -171,7 +171,7 @@ class Cylindrical(AnimationMap):
         numbers = (*checked_interval("r_range", r_range, AXIS), *checked_interval("z_range", z_range, -np.inf))
         if not 0 <= legs_of < _CLIPS:
             raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
-        self.upper, self.legs_of, self._called = tuple(upper), legs_of, tuple(called)
+        self.upper, self.legs_of = tuple(upper), legs_of
         legs = 1.0 + legs_of if self.upper else 0.0
         super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
                          len(self.upper) > 0)  # fmt: skip
@@ -207,7 +207,7 @@ class Cylindrical(AnimationMap):
         """A remark if only some joints are blended."""
         if not self.upper:
             return ()
-        remark = f"the clips are too different to average, so legs and trunk are those of {self._called[self.legs_of]}"
+        remark = f"the clips are too different to average, so legs and trunk are those of {self.called[self.legs_of]}"
         if self.share < 1.0:
             remark += f", with {arms_of_others(self.share)}"
         return (remark,)

@@ -36,10 +36,11 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
     """
     motions, reach = motions_of(clips, CORNERS, "cylindrical"), place.reach
     radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
-    called = [clips[i % len(clips)].name for i in range(CORNERS)]
 
     def with_legs_of(owner: int) -> CylindricalMap:
-        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner, called)
+        made = CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
+        made.called = tuple(clips[i % len(clips)].name for i in range(CORNERS))
+        return made
 
     def choose_legs() -> tuple[CylindricalMap, tuple[str, ...]]:
         return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)

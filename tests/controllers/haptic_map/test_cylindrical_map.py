@@ -89,8 +89,8 @@ def test_root_and_legs_of_one_clip_do_not_depend_on_the_corner(owner):
             np.testing.assert_allclose(difference(pose, own)[:12], 0.0, atol=1e-9)
             np.testing.assert_allclose(difference(pose, others)[12:], 0.0, atol=1e-9)
     assert arms.remarks[0].endswith(f"of the {('first', 'second', 'third', 'fourth')[owner]} clip")
-    named = Cylindrical(CLIPS, R, Z, upper=(3,), legs_of=owner, called=("walk", "jog", "kick", "wave"))
-    assert named.with_share(0.5).remarks[0].split(", with")[0].endswith(f"of {('walk', 'jog', 'kick', 'wave')[owner]}")
+    arms.called = ("walk", "jog", "kick", "wave")
+    assert arms.with_share(0.5).remarks[0].split(", with")[0].endswith(f"of {arms.called[owner]}")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
