@@ -118,8 +118,8 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     MotionFileError
         If the file cannot be read, or contradicts itself.
     ModelError
-        If the motion has a single frame, lasts longer than two minutes because of a coarse frame rate, if the part that
-        is used lasts longer than that, or if the loop is not within the motion.
+        If the motion has a single frame, lasts less than two frames at 120 Hz, or longer than two minutes because of a
+        coarse frame rate, if the part that is used lasts longer than that, or if the loop is not within the motion.
     """
     began = process_time()
     loaded = load(path, hints)
@@ -131,6 +131,12 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
         raise ModelError(f"{path}: {what}; expected a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or --frame-rate")
     timed = correct_pace(resampled(captured, FPS))
     even_clip = resampled(timed.clip, FPS)
+    if even_clip.n_frames < 2:
+        frames = f"{captured.n_frames} frames that last {two_digits(captured.duration)} s"
+        raise ModelError(
+            f"{path}: {frames}; expected 1/{FPS:g} s at least: a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or "
+            "--frame-rate"
+        )
     attempt = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
     # A decay if no last step is feasible nearby. Joints stop within their ranges only if needed: otherwise a backflip
     # has a residual of 27 % instead of 8 %.

@@ -307,6 +307,13 @@ def test_frame_time_too_long_for_a_camera_is_remarked_and_not_prepared(walk_rows
         prepared(tmp_path / "r.bvh")
 
 
+def test_motion_of_less_than_two_prepared_frames_is_refused(walk_rows, tmp_path):
+    path = tmp_path / "r.bvh"
+    path.write_text(re.sub(r"Frame Time: \S+", "Frame Time: 0.00003", path.read_text()))
+    with pytest.raises(ModelError, match=r"frames that last 0\.00\d+ s; expected 1/120 s at least: a Frame Time"):
+        prepared(path)
+
+
 def test_legs_that_swing_faster_than_any_human_s_are_remarked(walk_rows, tmp_path):
     text = (tmp_path / "r.bvh").read_text()
     for seconds, expected_count in (("0.0333333", 0), ("0.0083333", 0), ("0.0033333", 1), ("0.0001", 1)):
