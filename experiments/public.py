@@ -16,15 +16,15 @@ from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
 
 
-def clips(*names: str) -> tuple[Clip, ...]:
-    """Embedded clips by name; all of them if no name is given.
+def clips(*names: str | Path) -> tuple[Clip, ...]:
+    """Embedded clips by name, and motions in files as by `load`; all embedded clips if no name is given.
 
     Raises
     ------
     ModelError
-        If there is no clip of that name.
+        If there is no clip of that name, or a file cannot be read.
     """
-    return tuple(embedded(name) for name in names or embedded_names())
+    return tuple(load(name) if Path(name).suffix else embedded(str(name)) for name in names or embedded_names())
 
 
 @with_keyword_messages()

@@ -233,7 +233,8 @@ class Lead:
     damping : float
         Damping of the hand [N s/m].
     floor_scale : float, optional
-        Metres of floor per metre of the stylus [1]; by default such that the figure goes along the default S in 5 s.
+        Metres of floor per metre of the stylus [1]; by default such that the figure goes along the default S in 5 s,
+        or longer if the gait is slow for its strides.
     """
 
     kind: Literal["lead"] = "lead"

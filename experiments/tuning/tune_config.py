@@ -173,7 +173,10 @@ def check_tuning(config: TuneConfig) -> None:
     _check_space(config, where)
     _check_objectives(config, where)
     if config.users.seed == config.held_back.seed:
-        raise StudyError(f"{where}: panel and held-back users are of the same seed {config.users.seed}; expected two")
+        raise StudyError(
+            f"{where}: panel and held-back users are of the same seed {config.users.seed}; expected another in "
+            f"[held_back], such as seed = {config.users.seed + 1}"
+        )
     if config.sampler == "cma-es" and (len(config.objectives) > 1 or len(config.space) < 2):
         raise StudyError(f"{where}: CMA-ES needs one objective and two numbers or more; expected sampler = 'tpe'")
     for does in config.tasks or (config.users.does, config.held_back.does):

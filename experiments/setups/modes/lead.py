@@ -23,7 +23,10 @@ from sim.users.hand.arm import Arm
 from sim.users.intents import Lead as LeadIntent
 from sim.users.participant import Participant
 
-TRAVEL_TIME = 5.0  # [s] along the S at the clip's own pace
+TRAVEL_TIME = 5.0  # [s] along the S at the clip's own pace, at least
+# Least length of the S over the distance at which the figure follows the stylus. A shorter one is over before a slow
+# gait has turned: a zombie's walk (0.34 m/s) was 0.5 m beside an S of 1.7 m, and the field asked for 7.4 N.
+_LEAST_TRAVEL = 3.0
 _START_RADIUS = 0.025  # [m] largest distance of the hand from its place on the curve at the start
 # Largest lateral acceleration of a gait with flights [m/s²]: leaning more, the figure falls after a slightly missed
 # landing.
@@ -47,6 +50,9 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
     tank = tank_for(limiter.peak * fastest(course), ((np.inf, WORKSPACE_WIDTH),), _START_RADIUS, limiter)
     gait = field.walking.gait
     static = {"lead_scale": field.walking.scale, "lead_stride": gait.stride, "lead_support": gait.support.astype(float)}
+    arm = leading_hand(field)
+    until = len(arm.path) * arm.period
+    late = f"the hand leads until {until:.1f} s; give --seconds more than that"
     notes = Notes("LEAD", 0.0, "", "the figure's path", "leads", static)
 
     def summarise(summary: RunSummary, of: Measuring) -> RunSummary:
@@ -54,9 +60,10 @@ def lead_parts(config: RunConfig, mode: Lead, maps: LedParts) -> Parts:
         return replace(summary, lead=lead)
 
     return Parts(
-        config=config, maps=maps, field=field, program=field.program(), course=course, user=_make_hand(config, field),
+        config=config, maps=maps, field=field, program=field.program(), course=course, user=_make_hand(config, arm),
         tank=tank, notes=notes, gains=_FLYING if maps.haptic_map.flies else _WALKING, walking=field.walking,
         argument_at=lambda nearest, phases: walker_argument(phases), handled=((0.0, np.inf),), summarise=summarise,
+        remarks=(late,) if config.seconds <= until else (),
     )  # fmt: skip
 
 
@@ -70,16 +77,21 @@ def leading(mode: Lead, gait: Gait) -> Leading:
     """
     curve = s_curve()
     x, y, _ = curve.point(curve.start)
-    scale = TRAVEL_TIME * gait.speed / curve.length if mode.floor_scale is None else mode.floor_scale
     flying = {"lateral": _MAX_FLYING_LATERAL} if gait.flies else {}
     running = {"forward": _MAX_RUNNING_PACE} if gait.flies or gait.grounded else {}
-    walking = Walking(gait, (float(x), float(y)), -HALF_TURN, scale, **flying, **running)
+    walking = Walking(gait, (float(x), float(y)), -HALF_TURN, **flying, **running)
+    # The path is steered from its front, D ahead of the figure. At the gait's own pace the stylus is 2 v/ω beyond it,
+    # and the damping ratio of the steering on a straight line is √2 v/(ω D): 0.7 or more.
+    walking = replace(walking, rate=min(walking.rate, 2.0 * gait.speed / walking.ahead))
+    length = max(TRAVEL_TIME * gait.speed, _LEAST_TRAVEL * (walking.ahead + walking.lead[0]))
+    scale = length / curve.length if mode.floor_scale is None else mode.floor_scale
+    walking = replace(walking, scale=scale)
     return Leading(walking, k_l=mode.leash, b=mode.damping)
 
 
-def _make_hand(config: RunConfig, field: Leading) -> Arm | Participant:
+def _make_hand(config: RunConfig, arm: Arm) -> Arm | Participant:
     """The hand that leads: an arm's impedance, or a person along the same path."""
-    arm, person = leading_hand(field), config.user.person
+    person = config.user.person
     if person is None:
         return arm
     return participant(person, LeadIntent(arm.path, arm.period), s_curve(), config.seconds, config.seed)

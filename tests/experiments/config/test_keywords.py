@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hvf
@@ -15,6 +16,7 @@ from controllers.errors import ParameterError
 from experiments.cli import main
 from experiments.config.keywords import option_message, to_keywords, with_keyword_messages
 from experiments.config.options import run_config
+from models.mocap.readers.own_bvh import write_bvh
 
 CURVE = hvf.circle()
 SIM = hvf.Simulation(
@@ -197,3 +199,13 @@ def test_warning_of_infeasible_capture_names_keywords(monkeypatch: pytest.Monkey
         hvf.load("mine.bvh")
     assert [str(one.message) for one in caught] == ["not feasible; raw takes the capture as it is"]
     assert caught[0].filename == __file__
+
+
+def test_clips_are_names_or_files(tmp_path: Path) -> None:
+    path = tmp_path / "mine.bvh"
+    write_bvh(hvf.clips("walk")[0], path)
+    walk, mine = hvf.clips("walk", path)
+    np.testing.assert_allclose(mine.poses, walk.poses, atol=1e-4)
+    assert (mine.name, len(hvf.clips())) == ("mine", 9)
+    with pytest.raises(hvf.HvfError, match="no embedded clip 'wlak'; there are "):
+        hvf.clips("wlak")

@@ -1,5 +1,6 @@
 """Measures of a led run on motions with known answers, and refused configurations of the lead mode."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, cast
 
@@ -125,6 +126,24 @@ def test_leading_path_is_reachable_and_closed() -> None:
     curve = s_curve()
     assert np.hypot(*np.ptp(path[:, :2], axis=0)) == pytest.approx(0.14, rel=0.1)
     assert field.walking.scale * curve.length == pytest.approx(5.0 * GAIT.speed)
+
+
+def test_slow_gait_with_long_strides_is_led_along_a_longer_curve_with_damped_steering() -> None:
+    """A zombie's walk was 0.5 m beside the curve: steering from a front 0.7 m ahead had a damping ratio of 0.3."""
+    fast, slow = leading(Lead(), GAIT).walking, leading(Lead(), replace(GAIT, speed=0.34, reach=0.59)).walking
+    assert fast.rate == 2.5
+    assert np.sqrt(2.0) * slow.gait.speed / (slow.rate * slow.ahead) == pytest.approx(np.sqrt(0.5))
+    assert slow.scale * s_curve().length == pytest.approx(3.0 * (slow.ahead + slow.lead[0]))
+    assert leading(Lead(floor_scale=7.0), GAIT).walking.scale == 7.0
+
+
+@pytest.mark.parametrize(("seconds", "remarked"), [(10.0, True), (25.0, False)])
+def test_run_that_ends_before_the_hand_has_led_is_remarked(seconds: float, remarked: bool) -> None:
+    config = run_config(mode="lead", clips=("walk",), seconds=seconds)
+    mode, maps = cast(Lead, config.mode), led_parts(config, (embedded("walk"),), figure_model())
+    remarks = lead_parts(config, mode, maps).remarks
+    assert bool(remarks) is remarked
+    assert all(remark.endswith("s; give --seconds more than that") for remark in remarks)
 
 
 @pytest.mark.parametrize(("name", "feet"), [("walk", 2), ("run", 1)])
