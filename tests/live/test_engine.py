@@ -10,6 +10,7 @@ import pytest
 
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import TRACE_SIZE
+from controllers.walking.walker import walker_at
 from experiments.config.options import run_config
 from experiments.live.session import engine_process
 from experiments.live.session.engine import MAX_HAND_FORCE, Drag, Engine
@@ -247,6 +248,23 @@ def test_drag_without_bend_or_lead_is_reported_as_one_push(tmp_path, mode, press
         assert push["deviation_mm"] > 1.0
         assert f"{push['peak_force']:.1f} N at 0.3 s" in " ".join(lines)
         assert "The hand did not push." not in lines
+
+
+def test_take_of_a_led_figure_has_the_measures_of_leading(tmp_path):
+    engine = make_engine("lead")
+    run(engine, 0.4)
+    engine.drag = Drag(engine.stylus + np.array([0.02, -0.02, 0.0]))
+    run(engine, 1.0)
+    walker = walker_at.py_func(engine.session.servo.field.walkers.state, 0)
+    before = float(walker.argument[0])
+    take = Take(tmp_path / "take", engine)
+    for _ in range(160):
+        take.add(engine.advance(), engine)
+    lines = take.end(engine)
+    length = json.loads((tmp_path / "take" / SUMMARY).read_text())["lead"]["length_m"]
+    assert 0.05 < length == pytest.approx(float(walker.argument[0]) - before, abs=0.01)
+    assert any(line.startswith("The figure was led") for line in lines)
+    assert not any("laps" in line for line in lines)
 
 
 def test_too_short_take_is_refused(tmp_path):

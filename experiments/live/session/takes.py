@@ -14,7 +14,7 @@ from experiments.results.folder import CONFIG, RECORDING, SUMMARY, check_folder,
 from experiments.results.measures.run_measures import summarise
 from experiments.results.measures.stretch_summary import stretch_summary
 from experiments.results.measures.summary_parts import SpeedSummary
-from experiments.runs.run import write_animations
+from experiments.runs.run import session_summary, write_animations
 from experiments.setups.session import default_poses
 from geometry.whole_files import write_text
 from sim.errors import SimError
@@ -98,10 +98,13 @@ class Take:
         parts = replace(engine.session.parts, config=engine.config, handled=tuple(self._handled_spans))
         session = replace(engine.session, parts=parts)
         speed = SpeedSummary(seconds / (time.perf_counter() - self._wall_start), 0.0, peak_memory_mb())
-        with Recording(self.folder / RECORDING) as recording:
-            summary = summarise(
-                recording, default_poses(session), speed, session.world.warnings(), session.parts.handled
-            )
+        if engine.config.leads:
+            summary = session_summary(self.folder, session, speed)
+        else:  # other modes' own measures are of hands that a configuration tells what to do
+            with Recording(self.folder / RECORDING) as recording:
+                summary = summarise(
+                    recording, default_poses(session), speed, session.world.warnings(), session.parts.handled
+                )
         lines = summary.lines()
         tubes = engine.tubes
         if isinstance(tubes, StretchyTubes):

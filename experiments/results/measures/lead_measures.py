@@ -30,7 +30,7 @@ class LeadSummary:
     Attributes
     ----------
     length_m : float
-        Length of the walked path.
+        Length of the path walked forwards since the recording began.
     turn_deg_per_s : tuple of three float
         Largest turn rates of the path while the figure went along it on no foot, on one foot and on two.
     force_max : float
@@ -116,8 +116,8 @@ def lead_summary(
         farthest = max(farthest, float(s.max()))
     none, one, two = (math.degrees(rate) for rate in turns)
     return LeadSummary(
-        farthest, (none, one, two), force, limited / recording.rates["ticks"], 100.0 * soles.slide,
-        None if figure is None else 100.0 * pressing.slide, *shown.result(), *physical.result(),
+        farthest - float(ticks["phase"][0]), (none, one, two), force, limited / recording.rates["ticks"],
+        100.0 * soles.slide, None if figure is None else 100.0 * pressing.slide, *shown.result(), *physical.result(),
     )  # fmt: skip
 
 
