@@ -31,7 +31,8 @@ def clips(*names: str | Path) -> tuple[Clip, ...]:
 def load(path: str | Path, raw: bool = False) -> Clip:
     """The motion in a BVH, AMC or DeepMimic file on the figure, prepared once as by ``hvf prepare``.
 
-    A file on the figure's own skeleton is taken as it is. Warns if no motion near the capture is feasible on contact.
+    A prepared file, on the figure's own skeleton and closed or at rest at both ends, is taken as it is. Warns if no
+    motion near the capture is feasible on contact.
 
     Parameters
     ----------

@@ -121,6 +121,7 @@ class Uploaded(NamedTuple):
 def preparation(requests: Any, answers: Any) -> None:
     """Worker for preparing clips: answers an `Uploaded` to a pair (source, target) of files."""
     from experiments.preparation.command import prepare_file
+    from experiments.preparation.prepared_clip import is_prepared
     from experiments.preparation.prepared_file import summary
     from models.mocap.library import load
     from models.mocap.readers.own_bvh import write_bvh
@@ -130,7 +131,7 @@ def preparation(requests: Any, answers: Any) -> None:
         begin = time.perf_counter()
         try:
             loaded = load(source)
-            if loaded.report is None:  # already on the figure's own skeleton, as written by this page
+            if is_prepared(loaded):
                 write_bvh(loaded.clip, target)
                 text = f"{source.stem}: {loaded.clip.duration:.1f} s on the figure's own skeleton, taken as it is"
             else:

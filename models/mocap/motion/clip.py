@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from geometry import quaternions
-from geometry.arrays import Array
+from geometry.arrays import Array, rms
 from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, N_TANGENT, Pose
 
@@ -147,6 +147,13 @@ class Clip:
         gap = pose_difference(self.displacement.moved(self.poses[0]), self.poses[-1])
         joints = np.linalg.norm(gap[3:].reshape(-1, 3), axis=1)
         return bool(max(np.linalg.norm(gap[:3]), joints.max()) <= tolerance)
+
+    def end_speed(self) -> float:
+        """RMS of the joints' velocities at the faster of the two ends [rad/s]."""
+        if self.n_frames < 2:
+            return 0.0
+        steps = pose_difference(self.poses[[0, -2]], self.poses[[1, -1]])[:, 6:]
+        return self.fps * max(rms(steps[0]), rms(steps[1]))
 
     def with_next_lap(self) -> "Clip":
         """A closed clip and its next lap, continued from where the first ends: a flight over the seam is then whole."""

@@ -196,13 +196,10 @@ def _sole_tilt(clip: Clip, resting: Mask) -> float:
 
 
 def _seam_velocity(clip: Clip, closed: bool) -> float:
-    if clip.n_frames < 3:
-        return 0.0
-    steps = pose_difference(clip.poses[:-1], clip.poses[1:])[:, 6:] * clip.fps
-    first, last = steps[0], steps[-1]
-    if closed:
-        return rms(first - last)
-    return max(rms(first), rms(last))
+    if not closed or clip.n_frames < 3:
+        return clip.end_speed()
+    first, last = pose_difference(clip.poses[[0, -2]], clip.poses[[1, -1]])[:, 6:] * clip.fps
+    return rms(first - last)
 
 
 def _gravity_deviation(clip: Clip, flights: Sequence[tuple[float, float]]) -> float:

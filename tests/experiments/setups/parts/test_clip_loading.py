@@ -97,6 +97,29 @@ def test_own_files_and_embedded_clips_are_not_prepared(tmp_path: Path, calls: li
     assert not remarks
 
 
+def test_own_file_that_neither_closes_nor_rests_at_its_ends_is_prepared(tmp_path: Path, calls: list[Path]) -> None:
+    """As an edited animation or a converted capture: closed over its ends, its feet slid by up to 1.5 m."""
+    walk, path = embedded("walk"), tmp_path / "edited.bvh"
+    write_bvh(Clip(walk.poses[:140], walk.fps, "edited"), path)
+    assert load_clips([str(path)])[1] == ("edited.bvh: prepared; --raw takes the capture as it is",)
+    write_bvh(Clip(walk.poses[:240], walk.fps, "edited"), path)
+    part = "prepared from 0.25 to 1.50 s, its cycle (hvf prepare --loop open keeps all)"
+    assert part in load_clips([str(path)])[1][-1]
+    assert calls == [path, path]
+    assert load_clips([str(path)], raw=True)[1] == ()
+
+
+def test_own_file_at_rest_at_both_ends_is_prepared_for_leading_only(tmp_path: Path, calls: list[Path]) -> None:
+    walk, path = embedded("walk"), tmp_path / "own.bvh"
+    still = np.vstack((walk.poses[[0, 0]], walk.poses, walk.poses[[-1, -1]]))
+    still[:2, 2] += 0.01  # it does not close
+    write_bvh(Clip(still, walk.fps, "own"), path)
+    load_clips([str(path)])
+    assert not calls
+    load_clips([str(path)], loop="lap")
+    assert calls == [path]
+
+
 def test_raw_option_is_stored_in_the_configuration() -> None:
     assert not run_config(clips=("walk",)).map.raw
     assert run_config(clips=("walk",), raw=True).map.raw
