@@ -142,7 +142,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         unit_name(motion.unit, lines.leg, figure_leg),
         scale,
         frames.dropped,
-        up.confidence,
+        up.lead,
         remarks,
     )
     return clip, report

@@ -79,7 +79,7 @@ class RetargetReport(NamedTuple):
         Metres of the figure per unit of the file.
     dropped : int
         Number of frames left out in front, of a calibration pose such as a T-pose.
-    confidence : float
+    lead : float
         Lead of the score of `up` over the next axis, at least 0.25; infinite where the format or the user states it.
     remarks : tuple of str
         What could not be determined, and what was assumed instead.
@@ -93,7 +93,7 @@ class RetargetReport(NamedTuple):
     unit: str
     scale: float
     dropped: int = 0
-    confidence: float = np.inf
+    lead: float = np.inf
     remarks: tuple[str, ...] = ()
 
     @property
@@ -103,7 +103,8 @@ class RetargetReport(NamedTuple):
 
     def lines(self) -> tuple[str, ...]:
         """The report in words, a line per subject."""
-        how = "given or known from the format" if np.isinf(self.confidence) else f"confidence {self.confidence:.2f}"
+        ahead = f"with a score {self.lead:.2f} above the next axis"
+        how = "given or known from the format" if np.isinf(self.lead) else ahead
         named = ", ".join(self.unused[:_MAX_NAMED])
         lines = (
             f"axes: up is {self.up} ({how}), the body faces {self.facing} at first",

@@ -123,7 +123,7 @@ def _body_roles(
     body = joints_below(roles.segments["pelvis"], motion.parents)
     vertical = up_axis(motion, roles, lines, positions[:, body], up)
     # With arms longer than legs, these seem to be exchanged, in a body that hangs upside down.
-    if np.isfinite(vertical.confidence) and not any((vertical.axis == AXES[name]).all() for name in ("+Y", "+Z")):
+    if np.isfinite(vertical.lead) and not any((vertical.axis == AXES[name]).all() for name in ("+Y", "+Z")):
         raise _Unclear("up would be an axis that programs do not write: --up states it")
     if np.quantile(unit(lines.trunk) @ vertical.axis, 0.8) < _MIN_STANDING_COSINE:
         raise _Unclear("its trunk is hardly ever upright")

@@ -1,4 +1,4 @@
-r"""Estimation of a file's vertical axis from the motion, with a confidence.
+r"""Estimation of a file's vertical axis from the motion, with its lead over the next.
 
 Each of the file's six axes u is scored: the body should stand along u, not climb along u, and have its weight over its
 lowest joints,
@@ -81,12 +81,12 @@ class Up(NamedTuple):
     ----------
     axis : array of shape (3,)
         Upward unit vector in the file's axes.
-    confidence : float
+    lead : float
         Lead of its score over that of the next axis; infinite where the format or the user states it.
     """
 
     axis: Array
-    confidence: float
+    lead: float
 
 
 def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Array, said: str | None = None) -> Up:
