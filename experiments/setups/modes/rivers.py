@@ -54,7 +54,7 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
     power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
     springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
-    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle))
+    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle, maps))
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
     field = FixedField(law, course, power, springs, notes, urged, pushes=pushes, other=beside(choice.given, maps.curve))
     parts = fixed_curve_parts(config, mode, maps, field)
@@ -128,11 +128,14 @@ def default_choice(mode: Rivers, curve: Trajectory, reach: float) -> RiverChoice
     return RiverChoice(replace(bundle, rivers=led), given, pace, max(HYSTERESIS * pace, LEAST_HYSTERESIS))
 
 
-def drawn(bundle: RiverBundle) -> Static:
-    """Names and curves of rivers, for figures and replays."""
+def drawn(bundle: RiverBundle, maps: ClipMapParts) -> Static:
+    """Names of rivers, with that of the clip that each plays, and their curves, for summary, figures and replays."""
+    names, clips = bundle.names, maps.clips
+    if maps.plays_rivers:
+        names = tuple(f"{name} ({' '.join(clips[k % len(clips)].name.split())})" for k, name in enumerate(names))
     share = np.linspace(0.0, 1.0, COURSE_POINTS)
     curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
-    return {"river_names": "\n".join(bundle.names), "river_curves": np.array(curves)}
+    return {"river_names": "\n".join(names), "river_curves": np.array(curves)}
 
 
 def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:

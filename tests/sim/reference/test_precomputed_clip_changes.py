@@ -195,7 +195,8 @@ def test_run_with_changes_compiles_nothing_in_its_own_process(run_with_changes: 
 @pytest.mark.usefixtures("run_with_changes")
 def test_river_switch_is_recorded_at_its_time(run_folder: Path) -> None:
     summary = json.loads((run_folder / "summary.json").read_text())
-    assert "level → wave" in "\n".join(summary["lines"])
+    level, wave = DISTINCT_CLIPS[:2]
+    assert f"level ({level}) → wave ({wave})" in "\n".join(summary["lines"])
     with Recording(run_folder / "run.h5") as recording:
         river, t = recording.channel("ticks", "river")[:], recording.channel("ticks", "t")[:]
     first = int(np.flatnonzero(np.diff(river))[0])

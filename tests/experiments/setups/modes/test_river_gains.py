@@ -1,4 +1,7 @@
-"""Default gains of rivers, with which the default push moves the hand from one river into another."""
+"""Default gains of rivers, with which the default push moves the hand from one river into another; their names."""
+
+from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,11 +15,12 @@ from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
 from experiments.config.modes import Rivers
 from experiments.config.options import run_config
-from experiments.setups.modes.rivers import river_time
+from experiments.setups.modes.rivers import drawn, river_bundle, river_time
 from experiments.setups.parts.defaults import resolved, river_gains
-from experiments.setups.parts.part_types import Parts
+from experiments.setups.parts.part_types import ClipMapParts, Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
+from models.mocap.library import embedded
 from sim.users.hand.arm import hand_force
 
 MASS, FRICTION, PERIOD = 0.15, 0.03, 1e-3  # [kg], [N], [s]; mass and friction are about the Phantom's
@@ -88,3 +92,10 @@ def test_hand_stays_in_its_river_without_push_or_with_stiff_gains() -> None:
     alone = FollowMode()
     stiff = parts_with(stiffness=alone.stiffness, damping=alone.damping)
     assert not np.all(river_at_each_tick(stiff)[2600:] > 0.0)
+
+
+def test_names_of_rivers_tell_the_clip_that_each_plays() -> None:
+    maps, bundle = cast(ClipMapParts, MAPS), river_bundle(CURVE, 0.02, 0.1, 8.0, 0.015)
+    assert drawn(bundle, maps)["river_names"] == "level\nwave\nhigh"
+    own = replace(maps, clips=(embedded("walk"), embedded("jump")), plays_rivers=True)
+    assert drawn(bundle, own)["river_names"] == "level (walk)\nwave (jump)\nhigh (walk)"
