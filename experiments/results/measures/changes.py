@@ -8,6 +8,9 @@ from experiments.results.measures.blocks import ROWS
 from sim.recording.recording import Recording
 from sim.reference.transition import DWELL_TIME
 
+LOST = "no river until the end"
+_LOST_TIME = 1.0  # [s] in no river at the end of a run from which the hand counts as lost
+
 
 class RiverChange(NamedTuple):
     """One change of river.
@@ -17,7 +20,7 @@ class RiverChange(NamedTuple):
     t : float
         Time of the first tick at which the hand is in the new river [s].
     before, after : str
-        Names of the rivers.
+        Names of the rivers; `LOST` after the last one if no river has the hand until the end.
     """
 
     t: float
@@ -55,4 +58,6 @@ def river_changes(recording: Recording) -> tuple[RiverChange, ...]:
             if last >= 0.0:
                 changes.append(RiverChange(since, names[int(last)], names[int(current)]))
             last = current
+    if last >= 0.0 > current and float(t[len(t) - 1]) - since >= _LOST_TIME:
+        changes.append(RiverChange(since, names[int(last)], LOST))
     return tuple(changes)

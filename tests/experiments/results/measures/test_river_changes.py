@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.results.measures import changes
-from experiments.results.measures.changes import RiverChange, river_changes
+from experiments.results.measures.changes import LOST, RiverChange, river_changes
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 
@@ -34,3 +34,15 @@ def test_changes_are_found_at_their_first_tick_for_any_block_size(tmp_path: Path
 def test_field_without_rivers_has_no_changes(tmp_path: Path) -> None:
     with _recorded(tmp_path / "run.h5", False) as recording:
         assert river_changes(recording) == ()
+
+
+def test_hand_that_no_river_has_until_the_end_is_told(tmp_path: Path) -> None:
+    """Rivers that the governor gates let a hand go that is pushed out of one, if it is too slow for the others."""
+    for seconds, told in ((0.9, ()), (1.5, (RiverChange(0.4, "wave", LOST),))):
+        path = tmp_path / f"{seconds}.h5"
+        river = np.repeat([1.0, -1.0], [400, round(1000 * seconds)])
+        group, static = Group(1000.0, {"t": (), "river": ()}), {"river_names": "level\nwave\nhigh"}
+        with Recorder(path, {}, 0, {"ticks": group}, static) as recorder:
+            recorder.append("ticks", {"t": np.arange(len(river)) / 1000.0, "river": river})
+        with Recording(path) as recording:
+            assert river_changes(recording) == told
