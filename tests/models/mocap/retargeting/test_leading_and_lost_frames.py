@@ -363,10 +363,11 @@ def test_repeated_frames_are_interpolated(kept, repeats, walk_rows):
     found, whole = load_rows(rows[taken]), load_rows(rows[:n])
     assert "frames repeat the one before" in " ".join(found.report.remarks)
     assert not any("repeat" in remark for remark in whole.report.remarks)
-    # But for the second and the last frame, which may be held on purpose.
-    assert largest_angle(Clip(found.clip.poses[2:-1], 30.0, "f"), Clip(whole.clip.poses[2:-1], 30.0, "w")) < 8.0
-    repeated = load_rows(rows[taken] + np.arange(n)[:, None] * 1e-9)
-    assert largest_angle(Clip(repeated.clip.poses[2:-1], 30.0, "f"), Clip(whole.clip.poses[2:-1], 30.0, "w")) > 8.0
+    n = found.clip.n_frames
+    assert n == len(taken) - (kept[-1] == kept[-2])
+    assert largest_angle(Clip(found.clip.poses, 30.0, "f"), Clip(whole.clip.poses[:n], 30.0, "w")) < 8.0
+    repeated = load_rows(rows[taken] + np.arange(len(taken))[:, None] * 1e-9)
+    assert largest_angle(Clip(repeated.clip.poses[:n], 30.0, "f"), Clip(whole.clip.poses[:n], 30.0, "w")) > 8.0
 
 
 def test_a_pose_that_is_held_at_an_end_or_for_long_is_no_repeated_frame(walk_rows):
