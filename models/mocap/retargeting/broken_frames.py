@@ -117,8 +117,8 @@ def _remaining_jumps(motion: SourceMotion, roles: Roles) -> tuple[tuple[int, ...
     jumping = (steps > np.maximum(_jump_limits(steps, 2), _MIN_JUMP_ANGLE)).mean(axis=1) >= _MIN_JOINT_FRACTION
     lost = motion.at_rest(used)
     jumping |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _MIN_JUMP_ANGLE)
-    root = _root_positions(motion, roles)[:, 0]
-    jumping |= _lasting_jumps(_distances(root[:-1], root[1:]), _MIN_ROOT_JUMP * _thigh_length(motion, roles))
+    root = root_positions(motion, roles)[:, 0]
+    jumping |= _lasting_jumps(_distances(root[:-1], root[1:]), _MIN_ROOT_JUMP * thigh_length(motion, roles))
     single = np.argwhere(_lasting_jumps(steps, _MIN_JUMP_ANGLE) & ~jumping[:, None])
     return _indices(jumping), tuple(JointJump(int(k), used[i], float(steps[k, i])) for k, i in single)
 
@@ -199,15 +199,17 @@ def _tracks(motion: SourceMotion, roles: Roles) -> tuple[_Track, ...]:
     """Tracks of the joints' rotations and of the root's position."""
     rotations = motion.rotations[:, used_joints(motion, roles)]
     return (_Track(rotations, _MIN_JUMP_ANGLE, _angles, _angle_to_middle),
-            _Track(_root_positions(motion, roles), _MIN_ROOT_JUMP * _thigh_length(motion, roles),
+            _Track(root_positions(motion, roles), _MIN_ROOT_JUMP * thigh_length(motion, roles),
                    _distances, _distance_to_middle))  # fmt: skip
 
 
-def _root_positions(motion: SourceMotion, roles: Roles) -> Array:
+def root_positions(motion: SourceMotion, roles: Roles) -> Array:
+    """Position of the pelvis as the file moves it, shape (n, 1, 3), in its unit."""
     return motion.translations[:, ancestry(roles.segments["pelvis"], motion.parents)].sum(axis=1, keepdims=True)
 
 
-def _thigh_length(motion: SourceMotion, roles: Roles) -> float:
+def thigh_length(motion: SourceMotion, roles: Roles) -> float:
+    """Length of the left thigh, in the file's unit."""
     return float(np.linalg.norm(np.median(motion.translations[:, roles.segments["left_shank"]], axis=0)))
 
 

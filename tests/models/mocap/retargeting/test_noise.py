@@ -68,10 +68,13 @@ def test_jump_between_takes_is_not_smeared(tmp_path):
     assert angles(cleaned.rotations[59, 0], cleaned.rotations[60, 0]) > np.deg2rad(160.0)
 
 
-def test_slow_files_show_no_noise(tmp_path):
-    motion, roles = source(at_rate("walk", 30.0), tmp_path)
-    noisy = jittered(motion, 1.0, 5.0)
-    assert without_noise(noisy, roles, ())[0] is noisy
+@pytest.mark.parametrize("rate", [30.0, 20.0])
+def test_noise_is_found_from_23_frames_a_second_on(rate, tmp_path):
+    motion, roles = source(at_rate("run", rate), tmp_path)
+    laps = [motion.rotations[:-1]] * 5
+    longer = replace(motion, rotations=np.concatenate(laps), translations=np.tile(motion.translations[:-1], (5, 1, 1)))
+    assert without_noise(longer, roles, ())[0] is longer
+    assert any(without_noise(jittered(longer, 1.0, 5.0), roles, ())[1]) == (rate == 30.0)
 
 
 def written_with_noise(source_file, degrees, target):
