@@ -6,9 +6,11 @@ import pytest
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from controllers.motion.lap import MEMORY
+from controllers.state import stylus_path
 from experiments.fitting.figure_legs import figure_legs
 from experiments.lifting.lift import lift_clips
 from experiments.lifting.map_quality import in_between, measure_motion
+from geometry.easing import smooth_steps
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip
@@ -45,6 +47,20 @@ def test_feet_do_not_slide_while_the_mixture_changes():
     assert dragged.slide > 0.05
     assert stands.slide < 0.03
     assert stands.limits <= dragged.limits + np.deg2rad(1.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("names", "most"), [(("walk", "run"), 0.012), (("cheer", "ginga"), 0.05)])
+def test_feet_do_not_slide_while_the_figure_changes_from_one_clip_alone_to_the_other(names, most):
+    """Held in mixtures only, and let go as soon as a clip was alone, feet of cheer and ginga slid by 7 cm."""
+    haptic_map = lift_clips(names, Room()).haptic_map
+    for begin in np.linspace(0.0, TURN, 6, endpoint=False):
+        angles = np.arange(0.0, begin + 8.0, 0.012)
+        share = smooth_steps((angles - begin - 2.0) / 4.0)[:, None]
+        r, z = ((1.0 - share) * haptic_map.site(0, angles) + share * haptic_map.site(1, angles)).T
+        memory, points = haptic_map.fresh_memory(), np.column_stack([r * np.cos(angles), r * np.sin(angles), z])
+        poses = [haptic_map.pose(x, memory) for x in stylus_path(points)]
+        assert measure_motion(Clip(np.array(poses), 120.0, "change")).slide < most
 
 
 @pytest.mark.slow

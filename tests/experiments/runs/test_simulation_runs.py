@@ -25,7 +25,8 @@ def test_run_gives_measures_channels_animation_page_and_table(tmp_path: Path) ->
     assert isinstance(run, hvf.Run)
     assert run.summary.path.deviation_rms < 1e-3
     assert run.ticks["force"].shape == (4000, 3)
-    assert hvf.load(run.to_bvh(tmp_path / "edited.bvh")).duration == pytest.approx(4.0, abs=0.1)
+    edited = run.to_bvh(tmp_path / "edited.bvh")
+    assert hvf.load(edited, raw=True).duration == pytest.approx(4.0, abs=0.1)  # else its cycle is prepared
     assert run.report().stat().st_size > 1e5
     assert {"force_0", "p_2"} <= set(run.frame().columns)
 
