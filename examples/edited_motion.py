@@ -15,4 +15,4 @@ run = sim.run(3.0)
 with tempfile.TemporaryDirectory() as folder:
     path = run.to_bvh(Path(folder) / "edited.bvh")
     changed = run.summary.animation.pushed_deg
-    print(f"{path.name}: {hvf.load(path).duration:.1f} s; changed by up to {changed:.0f}° a joint")
+    print(f"{path.name}: {hvf.load(path, raw=True).duration:.1f} s; changed by up to {changed:.0f}° a joint")
