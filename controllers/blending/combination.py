@@ -228,8 +228,9 @@ def _hold_feet(
         hold_stance_foot(footing, n, ahead, mixing, soles[n], contact, frame, ends[n, 0], q[last])
     x, y = carry_root(footing, count, ahead)
     _move_lap(memory, heading, (x, y))
-    ends[:, 0, 0] -= x
-    ends[:, 0, 1] -= y
+    for n in range(count):
+        ends[n, 0, 0] -= x
+        ends[n, 0, 1] -= y
 
 
 @njit
@@ -283,8 +284,9 @@ def _combine_borrowed(
     root, ends = work_array((4, 3)), work_array((limbs, 4, 3))
     _mean_position(value, slope, 0, weights[0], changes[0], root)
     if correction.shape[1] > 0:
-        root[:, 0] += correction[:, 0]
-        root[:, 1] += correction[:, 1]
+        for k in range(1 + _PARAMETERS):
+            root[k, 0] += correction[k, 0]
+            root[k, 1] += correction[k, 1]
     for n in range(limbs):
         last, column = int(packed[LIMB_SIZE * n + LAST]), 3 + 4 * rotations + N_END_CHANNELS * n
         _mean_end(clips, drift, mixture, n, column, ends[n], q[last], rates[last])

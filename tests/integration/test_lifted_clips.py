@@ -114,7 +114,7 @@ def test_clip_at_rest_at_both_ends_is_lifted_forth_and_back(
     steps = Clip(walk.poses[: walk.n_frames // 3], walk.fps, "steps")
     for clip in (Clip(bow, 50.0, "bow"), steps):
         write_bvh(clip, tmp_path / f"{clip.name}.bvh")
-    lifted = lift_clips([str(tmp_path / "bow.bvh"), str(tmp_path / "steps.bvh")], Room())
+    lifted = lift_clips([str(tmp_path / "bow.bvh"), str(tmp_path / "steps.bvh")], Room(), raw=True)
     assert lifted.turned == lifted.haptic_map.closed == (True, False)
     there = lifted.clips[0]
     assert there.n_frames % 2 == 1

@@ -12,8 +12,8 @@ The cut-off f_c is the same for all components; it minimises the generalised cro
 with r_i what the spline takes away from component i, RMS, and ḡ the mean of g over all frequencies, the share of the
 spline's degrees of freedom. Sums over frequencies are cosine transforms (Garcia 2010) of the piece, continued at both
 ends by its point reflection. Where more than a bound is taken away, from joints or from the path of the root, and the
-highest quarter of the frequencies has nearly as much power as the second one, which is true of noise and not of limbs,
-there is noise. It would hide which feet stand, whose speeds are differences of frames. So it is removed from both, each
+highest quarter of the frequencies of the joints has nearly as much power as the second one, as noise has and limbs do
+not, there is noise. It would hide which feet stand, whose speeds are differences of frames. So it is removed from both, each
 with its own cut-off, that for γ = 1.4, which does not undersmooth where noise is correlated (Kim & Gu 2004), and at
 most 8 Hz, as preparation does with every motion.
 """
@@ -77,7 +77,7 @@ def without_noise(motion: SourceMotion, roles: Roles, jumps: Sequence[int]) -> t
     turning = _PER_AXIS * rotations[longest][:, used_joints(motion, roles)].reshape(len(longest), -1)
     path = root_positions(motion, roles)[longest, 0] * _THIGH / thigh
     turns, shifts = _estimated(turning, motion.fps), _estimated(path, motion.fps)
-    if not ((turns.flat and turns.amount >= _MIN_TURN) or (shifts.flat and shifts.amount >= _MIN_SHIFT)):
+    if not turns.flat or (turns.amount < _MIN_TURN and shifts.amount < _MIN_SHIFT):
         return motion, Noise(0.0, 0.0)
     smooth = np.concatenate([_smoothed(rotations[piece], turns.cutoff, motion.fps) for piece in pieces])
     smooth /= np.linalg.norm(smooth, axis=-1, keepdims=True)
