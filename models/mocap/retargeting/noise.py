@@ -13,9 +13,9 @@ with r_i what the spline takes away from component i, RMS, and ḡ the mean of g
 spline's degrees of freedom. Sums over frequencies are cosine transforms (Garcia 2010) of the piece, continued at both
 ends by its point reflection. Where more than a bound is taken away, from joints or from the path of the root, and the
 highest quarter of the frequencies of the joints has nearly as much power as the second one, as noise has and limbs do
-not, there is noise. It would hide which feet stand, whose speeds are differences of frames. So it is removed from both, each
-with its own cut-off, that for γ = 1.4, which does not undersmooth where noise is correlated (Kim & Gu 2004), and at
-most 8 Hz, as preparation does with every motion.
+not, there is noise. It would hide which feet stand, whose speeds are differences of frames. So it is removed from
+both, each with its own cut-off, that for γ = 1.4, which does not undersmooth where noise is correlated (Kim & Gu
+2004), and at most 8 Hz, as preparation does with every motion.
 """
 
 from collections.abc import Sequence
