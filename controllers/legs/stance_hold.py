@@ -46,19 +46,19 @@ from geometry.rotations import multiply, rotate
 from geometry.vectors import Quaternion
 
 # [m] height of the sole above which σ₀ is 0; up to `STANCE_HEIGHT` it is 1. In the example at `_MAX_OFFSET` feet slide
-# 0.3 cm, with 4.5 mm 0.6 cm, with 8 mm (`SWING_HEIGHT`) 0.4 cm and with 12 mm 0.9 cm.
+# 0.2 cm, with 4.5 mm 0.5 cm, with 8 mm (`SWING_HEIGHT`) 0.1 cm and with 12 mm 0.2 cm.
 _RELEASE_HEIGHT = 0.006
 # |1 − Σ w²| up to which μ is 0, and from which it is 1: for two clips, weights 0.999 and 0.947. A foot is to be held
-# from the beginning of a change on: with weights 0.985 and 0.72 feet slide 7.4 cm in changes from walk to jog, and
-# 5.2 cm with these (with `_MAX_OFFSET` 0.15).
+# from the beginning of a change on: with weights 0.985 and 0.72 feet slide 7.4 cm in changes from a walk to a jog, and
+# 5.9 cm with these, both with an offset of 0.15 m at most.
 _ALONE, _MIXED = 0.002, 0.1
-# κ and κ₁ [1/rad]. In the example at `_MAX_OFFSET` the slide stays 0.3 cm with half or twice κ.
+# κ and κ₁ [1/rad]. In the example at `_MAX_OFFSET` the slide is 0.1 cm with half of κ and 0.2 cm with twice.
 _FADE_RATE, _ALONE_FADE_RATE = 5.0, 0.2
-# κ_r [1/rad]. A root at rest needs 10 % more of weight in changes from a jog to a walk than it does with half of this
-# rate or all of it, and a bent walk 16.2 % where it has 10.2; with twice the rate other gaits need 0.8 points more.
+# κ_r [1/rad]. With 0, this, 1 and 3 the figure needs 9.4, 8.0, 7.7 and 8.7 % of weight in changes from a jog to a walk,
+# and 10.4, 11.2, 12.1 and 14.5 % in others from a run; with the first three 16, 10 and 13 % on a bent walk.
 _ROOT_RATE = 0.5
 # [m], [rad] largest offset. For a hand that visits walk, run, jump and angry once a lap, feet slide 5.8 cm without
-# footing and 0.3 cm with it; 0.9 cm with half the first number and 0.2 cm with twice.
+# footing and 0.2 cm with it; 0.3 cm with half the first number and 0.1 cm with twice.
 _MAX_OFFSET, _MAX_TURN = 0.3, 0.8
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
 _REVERSAL_ANGLE = 0.15  # [rad] backward motion after which the hand's direction counts as reversed

@@ -42,8 +42,8 @@ _NEGLIGIBLE = 1e-4  # ε [rad], [m]: as from rounded numbers
 # second or more those without visible noise have 0.18° and 2.1 mm at most.
 _MIN_TURN, _MIN_SHIFT = 0.0031, 0.0025
 # Least ratio of the power in the highest quarter of the frequencies to that in the second one, median of components. In
-# three walks at 30 frames a second it is 0.002 to 0.01, with white noise of 0.5° 0.31 to 0.42, with 1 and 2° 0.53 to
-# 0.8; in dances of 30 frames a second, whose steps are sampled too coarsely, at most 0.25.
+# three walks at 30 frames a second it is 0.002 to 0.015, with white noise of 0.5° 0.28 to 0.54, with 1 and 2° 0.60 to
+# 0.86; in dances of 30 frames a second, whose steps are sampled too coarsely, at most 0.22.
 _MIN_FLATNESS = 0.28
 _PER_AXIS = 4.0 / 3.0**0.5  # RMS of a quaternion's four components into that of a turn about each axis
 _THIGH = 0.45  # [m] of a human body, roughly: only noise is judged by it
