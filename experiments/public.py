@@ -23,7 +23,11 @@ def clips(*names: str | Path) -> tuple[Clip, ...]:
     ------
     ModelError
         If there is no clip of that name, or a file cannot be read.
+    ParameterError
+        If a name is neither text nor a path.
     """
+    for name in names:
+        check_kind("name", name, str | Path)
     return tuple(load(name) if Path(name).suffix else embedded(str(name)) for name in names or embedded_names())
 
 

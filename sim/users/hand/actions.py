@@ -71,7 +71,7 @@ class Push:
     def __post_init__(self) -> None:
         check_field_types(self)
         numbers = [self.at, self.seconds, self.force, self.radius, *_values(self.direction), *_values(self.place)]
-        if not np.all(np.isfinite(numbers)):
+        if not np.all(np.isfinite(np.array(numbers, dtype=float))):
             raise SimError(f"a push has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.at < 0.0 or self.radius <= 0.0:
             raise SimError(f"a push needs at ≥ 0 s, seconds > 0 and radius > 0 m, got {self}")
@@ -136,7 +136,7 @@ class Grab:
     def __post_init__(self) -> None:
         check_field_types(self)
         numbers = [self.at, self.seconds, self.hold, self.reach, *self.carry, *_values(self.place)]
-        if not np.all(np.isfinite(numbers)):
+        if not np.all(np.isfinite(np.array(numbers, dtype=float))):
             raise SimError(f"a grab has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.reach <= 0.0 or self.at < 0.0 or self.hold < 0.0:
             raise SimError(f"a grab needs seconds and reach > 0, at and hold ≥ 0 s, got {self}")
@@ -199,7 +199,7 @@ class Turn:
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        if not np.all(np.isfinite([self.at, self.seconds, self.angle, *self.axis])):
+        if not np.all(np.isfinite(np.array([self.at, self.seconds, self.angle, *self.axis], dtype=float))):
             raise SimError(f"a turn has a number that is not finite: {self}")
         if self.seconds <= 0.0 or self.at < 0.0 or abs(self.angle) > np.pi:
             raise SimError(f"a turn needs at ≥ 0 s, seconds > 0 and an angle within ±π, got {self}")
