@@ -131,7 +131,7 @@ def doubts(found: ClipBallistics) -> tuple[str, ...]:
 
 def changes(prepared: Prepared) -> tuple[str, ...]:
     """Changes made to the capture, a line each."""
-    part, pace, change = prepared.looped, prepared.paced, prepared.feasible
+    part, pace, change = prepared.looped, prepared.paced, prepared.attempt.change
     after = " after the frames that are left out" if prepared.report and prepared.report.dropped else ""
     when = f"{part.start:.2f} to {part.end:.2f} s{after}"
     words = {
@@ -179,14 +179,14 @@ def gaps(prepared: Prepared) -> tuple[str, str]:
 
 def infeasible(prepared: Prepared) -> tuple[str, ...]:
     """How far the nearest feasible motion that was found is from the capture, if none is near."""
-    change = prepared.feasible
+    tried, change = prepared.attempt, prepared.attempt.change
     if prepared.near:
         return ()
-    excess = max(0.0, float(np.rad2deg(beyond_ranges(change.clip.poses).max())))
-    residual = f"{100 * change.residual:.0f} % of weight"
-    if change.residual > MAX_RESIDUAL_IN_FLIGHTS:
+    excess = max(0.0, float(np.rad2deg(beyond_ranges(tried.clip.poses).max())))
+    residual = f"{100 * tried.residual:.0f} % of weight"
+    if tried.residual > MAX_RESIDUAL_IN_FLIGHTS:
         bound = 100 * MAX_RESIDUAL_IN_FLIGHTS
-        residual = f"{exceeding_text(100 * change.residual, bound)} % of weight, more than {bound:.0f}"
+        residual = f"{exceeding_text(100 * tried.residual, bound)} % of weight, more than {bound:.0f}"
     return (
         f"no feasible motion is near: the last one tried turns joints by {np.rad2deg(change.turned):.0f}° and raises "
         f"or lowers the root by {100 * change.raised:.0f} cm RMS, takes a joint {excess:.0f}° beyond its "

@@ -32,9 +32,9 @@ def row(path: Path, result: Prepared) -> str:
     """A line of the table."""
     was, now = (well_formed(clip, clip_flights(clip)) for clip in (result.captured, result.clip))
     before, after = followed(result.captured), followed(result.clip)
-    change, kept, seconds = result.feasible, result.fidelity, result.clip.duration
+    tried, kept, seconds = result.attempt, result.fidelity, result.clip.duration
     most, directions, places = kept.extremes[0], *_source_deviations(path, result)
-    motion_is_near = result.near and change.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
+    motion_is_near = result.near and tried.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
     why = "" if after.stands else "figure" if motion_is_near else "motion"
     cells = (
         _file_name(path),
@@ -43,7 +43,7 @@ def row(path: Path, result: Prepared) -> str:
         f"{before}",
         f"{after}" + ("" if result.near else " *"),
         why,
-        f"{100 * change.residual:.1f}",
+        f"{100 * tried.residual:.1f}",
         directions,
         places,
         f"{_soles_text(was)} → {_soles_text(now)}",

@@ -34,19 +34,12 @@ class Feasible(NamedTuple):
         The motion.
     residual : float
         RMS of the remaining residual force [body weights].
-    moved, raised : float
-        RMS change of the root's position over the floor, and of its height [m].
-    turned : float
-        RMS change of the rotations over joints and time [rad].
     costs : tuple of float
         Cost at first and after every iteration.
     """
 
     clip: Clip
     residual: float
-    moved: float
-    raised: float
-    turned: float
     costs: tuple[float, ...]
 
 
@@ -79,17 +72,8 @@ def feasible(
     errors = MotionErrors(change, schedule, overlap)
     x, costs = _Problem(change, errors).solve(iterations)
     points = x.reshape(-1, N_TANGENT)
-    sizes = change.size(points)
-    turns = np.linalg.norm(sizes[:, 6:].reshape(len(sizes), -1, 3), axis=2)
     force = np.linalg.norm(errors.at(x, False).residual[:, :3], axis=1) / errors.floor.body_weight
-    return Feasible(
-        change.changed(points, fps),
-        rms(force),
-        rms(np.linalg.norm(sizes[:, :2], axis=1)),
-        rms(sizes[:, 2]),
-        rms(turns),
-        tuple(costs),
-    )
+    return Feasible(change.changed(points, fps), rms(force), tuple(costs))
 
 
 class _Problem:

@@ -13,30 +13,18 @@ from models.errors import ModelError
 from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
-from models.mocap.motion.interpenetration import depths
 from models.mocap.motion.kinematics import contact_points
-from models.mocap.motion.ranges import beyond_ranges
-from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
-from models.mocap.preparation.feasible import Feasible, feasible
+from models.mocap.preparation.attempt import Attempt, attempt
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest
 from models.mocap.preparation.pace import Paced, correct_pace
 from models.mocap.preparation.poses import resampled, smoothed
-from models.mocap.preparation.root_path import without_foot_sliding
-from models.mocap.preparation.stances import Stances, stances, with_feet_at_rest
+from models.mocap.preparation.stances import Stances
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.retarget_report import MIN_FRAME_RATE, RetargetReport, two_digits
 from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
-# RMS change of joints [rad] and of the root's height [m] beyond which the result counts as another motion. Of nine
-# captures that change by 5 to 24°, six look like the same motion in pictures, and the figure tracks none of the nine
-# worse than the capture; results more than 30° away also have a residual of 27 % of body weight or more. The root's
-# displacement over the floor does not count, as captures drift.
-_MAX_ROTATION_CHANGE, _MAX_HEIGHT_CHANGE = 0.5, 0.15
-# How much further beyond its range a joint may be than in the capture [rad]. Of 177 prepared captures, those that are
-# tracked have 1° at most; runs that are cut at full speed come to rest by decay 50 to 80° further beyond.
-_MAX_ADDED_EXCESS = float(np.deg2rad(20.0))
 _MAX_DURATION = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
 
 
@@ -74,8 +62,8 @@ class Prepared(NamedTuple):
         Largest displacement of the root over the floor that keeps a supporting foot from sliding (`root_path`) [m].
     hands : HandLoad
         How long hands bear load, and how far their palms were moved to the floor; zeros if not `near`.
-    feasible : Feasible
-        Result of the optimisation.
+    attempt : Attempt
+        The feasible motion, and its distance from the looped capture.
     fidelity : Fidelity
         Distance of the clip from the capture.
     seconds : float
@@ -92,7 +80,7 @@ class Prepared(NamedTuple):
     looped: LoopedClip
     root_shift: float
     hands: HandLoad
-    feasible: Feasible
+    attempt: Attempt
     fidelity: Fidelity
     seconds: float
     near: bool
@@ -137,59 +125,35 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
             f"{path}: {frames}; expected 1/{FPS:g} s at least: a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or "
             "--frame-rate"
         )
-    attempt = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
+    tried = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
     # A decay if no last step is feasible nearby. Joints stop within their ranges only if needed: otherwise a backflip
     # has a residual of 27 % instead of 8 %.
     for ending in ("decay", "limited decay"):
-        if attempt.near or attempt.cycle.kind != "open":
+        if tried.near or tried.cycle.kind != "open":
             break
         cycle = close_or_rest(even_clip, loop, loaded.loops, mirror, ending)
-        if not np.array_equal(cycle.clip.poses, attempt.cycle.clip.poses):
-            attempt = _attempt(path, cycle, even_clip)
-    cycle, planted, schedule, result, near = attempt
-    carried = float(np.linalg.norm((planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
-    chosen = result.clip if near else smoothed(cycle.clip)
+        if not np.array_equal(cycle.clip.poses, tried.cycle.clip.poses):
+            tried = _attempt(path, cycle, even_clip)
+    cycle, near = tried.cycle, tried.near
+    carried = float(np.linalg.norm((tried.planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
+    chosen = tried.clip if near else smoothed(cycle.clip)
     clip = Clip(chosen.poses, chosen.fps, captured.name)
     distance = fidelity(clip, captured, cycle, timed.pace)
-    hands = _hand_load(planted, schedule) if near and schedule.hands.any() else HandLoad(0.0, 0.0)
+    bears = near and tried.schedule.hands.any()
+    hands = _hand_load(tried.planted, tried.schedule) if bears else HandLoad(0.0, 0.0)
     return Prepared(
-        clip, captured, loaded.report, timed, cycle, carried, hands, result, distance, process_time() - began, near
+        clip, captured, loaded.report, timed, cycle, carried, hands, tried, distance, process_time() - began, near
     )
 
 
-class _Attempt(NamedTuple):
-    """A looped clip, the same with its root moved, its contacts, the feasible motion, and whether it is near."""
-
-    cycle: LoopedClip
-    planted: Clip
-    schedule: Stances
-    result: Feasible
-    near: bool
-
-
-def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> _Attempt:
-    """Make a looped clip feasible."""
+def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> Attempt:
+    """Make a looped clip feasible, unless it is too long."""
     if (lasts := cycle.clip.duration) > _MAX_DURATION:
         which = {"cycle": "its cycle", "half stride": "its stride", "way back": "it, with the way back,"}
         what = f"{which.get(cycle.kind, 'it, at rest at both ends,')} lasts {lasts:.2f} s"
         part = "or a part of it by `hvf prepare --loop START:END`"
         raise ModelError(f"{path}: {what}; expected at most {_MAX_DURATION:.0f} s, {part}")
-    planted = without_foot_sliding(cycle.clip, smoothed(cycle.clip))
-    smooth = smoothed(planted)
-    schedule = with_feet_at_rest(stances(planted, smooth), planted)
-    result = feasible(smooth, schedule, fps=FPS, overlap=depths(captured.poses).max(axis=0))
-    near = (
-        result.turned < _MAX_ROTATION_CHANGE
-        and result.raised < _MAX_HEIGHT_CHANGE
-        and result.residual < MAX_RESIDUAL_IN_FLIGHTS
-        and _range_excess(result.clip) < max(_range_excess(captured), 0.0) + _MAX_ADDED_EXCESS
-    )
-    return _Attempt(cycle, planted, schedule, result, near)
-
-
-def _range_excess(clip: Clip) -> float:
-    """Largest excess of a joint over its range [rad], negative within it."""
-    return float(beyond_ranges(clip.poses).max())
+    return attempt(cycle, captured, FPS)
 
 
 def _hand_load(clip: Clip, schedule: Stances) -> HandLoad:

@@ -12,13 +12,14 @@ from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip, PlanarDisplacement
+from models.mocap.preparation.attempt import Attempt, RmsChange
 from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHTS
-from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.fidelity import fidelity
 from models.mocap.preparation.looping import LoopedClip, LostTurn
 from models.mocap.preparation.pace import Paced
 from models.mocap.preparation.poses import resampled
 from models.mocap.preparation.prepare import HandLoad, Prepared, prepared
+from models.mocap.preparation.stances import stances
 from models.mocap.preparation.well_formed import well_formed
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
@@ -88,9 +89,11 @@ def _made(falls: float | None, near: bool) -> Prepared:
     """A walk as prepared from a capture that turns by 90° after 1.2 s, which its cycle does not."""
     clip = embedded("walk")
     looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, LostTurn(np.pi / 2.0, 1.2))
+    schedule = stances(clip, clip)
+    tried = Attempt(looped, clip, schedule, clip, 0.0, RmsChange(0.0, 0.0, 0.0), near)
     return Prepared(
         clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0),
-        Feasible(clip, 0.0, 0.0, 0.0, 0.0, 0.0), fidelity(clip, clip, looped, 1.0), 0.0, near,
+        tried, fidelity(clip, clip, looped, 1.0), 0.0, near,
     )  # fmt: skip
 
 

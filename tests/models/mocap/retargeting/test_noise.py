@@ -94,5 +94,5 @@ def test_noisy_walk_becomes_a_feasible_clip(degrees, mocap, tmp_path):
     made = prepared(tmp_path / "noisy.bvh")
     assert made.near
     assert made.looped.kind == "cycle"
-    assert made.feasible.residual < 0.03
+    assert made.attempt.residual < 0.03
     assert "noise of" in " ".join(made.report.remarks)
