@@ -154,6 +154,8 @@ def changes(prepared: Prepared) -> tuple[str, ...]:
         lines.append(f"moved over the floor by up to {100 * prepared.root_shift:.0f} cm, since a loaded foot slides")
     if not prepared.near:
         return (*lines, "dynamics and feet as captured")
+    if not any(change):
+        return (*lines, "unchanged")
     if prepared.hands.seconds > 0.0:
         lines.append(
             f"hands are loaded for {prepared.hands.seconds:.2f} s, at points up to "

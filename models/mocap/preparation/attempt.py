@@ -108,6 +108,16 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
     return last
 
 
+def unchanged(clip: Clip) -> Attempt | None:
+    """A clip that is well-formed already, as its own feasible motion; None if it is not."""
+    measures = well_formed(clip, ())
+    if measures.faults():
+        return None
+    cycle = LoopedClip(clip, "cycle" if measures.closed else "open", 0.0, clip.duration, 0.0)
+    schedule = stances(clip, smoothed(clip))
+    return Attempt(cycle, clip, schedule, clip, measures.residual, RmsChange(0.0, 0.0, 0.0), True)
+
+
 def _shifted(clip: Clip, shift: Array) -> Clip:
     poses = clip.poses.copy()
     poses[:, :2] += shift

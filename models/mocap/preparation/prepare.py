@@ -14,7 +14,7 @@ from models.humanoid.skeleton import HAND_CONTACTS
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points
-from models.mocap.preparation.attempt import Attempt, attempt
+from models.mocap.preparation.attempt import Attempt, attempt, unchanged
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest
 from models.mocap.preparation.pace import Paced, correct_pace
@@ -88,7 +88,7 @@ class Prepared(NamedTuple):
 
 @on_one_blas_thread
 def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints | None = None) -> Prepared:
-    """Make a well-formed clip of the motion in a file.
+    """Make a well-formed clip of the motion in a file; one on the figure's own skeleton that is so already stays.
 
     Parameters
     ----------
@@ -125,15 +125,8 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
             f"{path}: {frames}; expected 1/{FPS:g} s at least: a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or "
             "--frame-rate"
         )
-    tried = _attempt(path, close_or_rest(even_clip, loop, loaded.loops, mirror), even_clip)
-    # A decay if no last step is feasible nearby. Joints stop within their ranges only if needed: otherwise a backflip
-    # has a residual of 27 % instead of 8 %.
-    for ending in ("decay", "limited decay"):
-        if tried.near or tried.cycle.kind != "open":
-            break
-        cycle = close_or_rest(even_clip, loop, loaded.loops, mirror, ending)
-        if not np.array_equal(cycle.clip.poses, tried.cycle.clip.poses):
-            tried = _attempt(path, cycle, even_clip)
+    kept = unchanged(even_clip) if loaded.report is None and loop == "auto" and not mirror else None
+    tried = kept or _nearest(path, even_clip, loop, loaded.loops, mirror)
     cycle, near = tried.cycle, tried.near
     carried = float(np.linalg.norm((tried.planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
     chosen = tried.clip if near else smoothed(cycle.clip)
@@ -144,6 +137,20 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     return Prepared(
         clip, captured, loaded.report, timed, cycle, carried, hands, tried, distance, process_time() - began, near
     )
+
+
+def _nearest(path: Path, clip: Clip, loop: str, wraps: bool | None, mirror: bool) -> Attempt:
+    """The capture looped and made feasible."""
+    tried = _attempt(path, close_or_rest(clip, loop, wraps, mirror), clip)
+    # A decay if no last step is feasible nearby. Joints stop within their ranges only if needed: otherwise a backflip
+    # has a residual of 27 % instead of 8 %.
+    for ending in ("decay", "limited decay"):
+        if tried.near or tried.cycle.kind != "open":
+            break
+        cycle = close_or_rest(clip, loop, wraps, mirror, ending)
+        if not np.array_equal(cycle.clip.poses, tried.cycle.clip.poses):
+            tried = _attempt(path, cycle, clip)
+    return tried
 
 
 def _attempt(path: Path, cycle: LoopedClip, captured: Clip) -> Attempt:

@@ -1,0 +1,100 @@
+"""Passes of an attempt at a feasible motion, and motions that need none."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.mocap.library import embedded
+from models.mocap.motion.clip import Clip
+from models.mocap.preparation import attempt as passes
+from models.mocap.preparation.attempt import Attempt, attempt, unchanged
+from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_SKATE
+from models.mocap.preparation.feasible import Feasible
+from models.mocap.preparation.looping import LoopedClip
+from models.mocap.preparation.poses import add_tangents
+from models.mocap.preparation.prepare import prepared
+from models.mocap.preparation.well_formed import well_formed
+from models.mocap.readers.own_bvh import write_bvh
+
+CHEER = embedded("cheer")
+CYCLE = LoopedClip(CHEER, "cycle", 0.0, CHEER.duration, 0.0)
+
+
+def attempted(
+    monkeypatch: pytest.MonkeyPatch, residuals: list[float], keeps: list[bool], turn: float = 0.0
+) -> tuple[Attempt, list[Clip]]:
+    """An attempt whose optimiser turns every joint by an angle in each pass and leaves given residuals."""
+    given: list[Clip] = []
+
+    def optimised(clip: Clip, *_: Any, **options: Any) -> Feasible:
+        given.append(clip)
+        tangents = np.zeros((clip.n_frames, 57))
+        tangents[:, 6::3] = turn
+        turned = Clip(add_tangents(clip.poses, tangents), clip.fps, clip.name)
+        return Feasible(turned, residuals[len(given) - 1], ())
+
+    def keeps_contact(_: Clip) -> bool:
+        return keeps[len(given) - 1]
+
+    monkeypatch.setattr(passes, "feasible", optimised)
+    monkeypatch.setattr(passes, "_keeps_contact", keeps_contact)
+    return attempt(CYCLE, CHEER, CHEER.fps), given
+
+
+@pytest.mark.parametrize(("keeps", "count"), [([True], 1), ([False, True], 2), ([False, False, False], 3)])
+def test_passes_continue_until_contact_is_kept_three_at_most(
+    keeps: list[bool], count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, given = attempted(monkeypatch, [0.01] * 3, keeps, turn=0.02)
+    assert len(given) == count
+    assert made.near
+    assert made.change.turned == pytest.approx(count * 0.02, rel=1e-2)  # from the capture, not from the last pass
+
+
+def test_pass_without_a_feasible_motion_does_not_replace_one_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, given = attempted(monkeypatch, [0.03, 0.2], [False, False])
+    assert len(given) == 2
+    assert (made.near, made.residual) == (True, 0.03)
+
+
+def test_large_residual_is_lowered_by_another_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, given = attempted(monkeypatch, [0.2, 0.03], [False, True])
+    assert len(given) == 2
+    assert (made.near, made.residual) == (True, 0.03)
+
+
+def test_motion_unlike_the_capture_ends_the_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, given = attempted(monkeypatch, [0.01, 0.01], [False, False], turn=0.6)
+    assert len(given) == 1
+    assert not made.near
+
+
+@pytest.mark.parametrize("name", ["walk", "jump"])
+def test_well_formed_clip_stays_as_it_is(name: str, tmp_path: Path) -> None:
+    clip = embedded(name)
+    write_bvh(clip, tmp_path / "mine.bvh")
+    made = prepared(tmp_path / "mine.bvh")
+    np.testing.assert_allclose(made.clip.poses, clip.poses, atol=1e-9)
+    assert not any(made.attempt.change)
+    assert made.near
+
+
+def test_clip_with_a_sinking_sole_is_not_taken_as_it_is() -> None:
+    poses = CHEER.poses.copy()
+    poses[:, 2] -= 0.02
+    assert unchanged(CHEER) is not None
+    assert unchanged(Clip(poses, CHEER.fps, "sunk")) is None
+
+
+@pytest.mark.slow
+def test_jumps_whose_feet_slide_under_load_keep_contact_after_a_second_pass(
+    mocap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After one pass a foot skates by 88 mm under load, and the physical figure falls at 7.3 s."""
+    made = well_formed(prepared(mocap / "cmu_amc/16_09.amc").clip, ())
+    assert made.skate < MAX_SKATE
+    assert made.residual < MAX_RESIDUAL
+    monkeypatch.setattr(passes, "_MAX_PASSES", 1)
+    assert well_formed(prepared(mocap / "cmu_amc/16_09.amc").clip, ()).skate > 10 * MAX_SKATE
