@@ -3,7 +3,7 @@
 A pass shifts the root so that supporting feet rest, low-passes, detects stances, and optimises. Contacts are thereby
 fixed before the optimisation: a foot that bears load while it was captured sliding slides in the result, too, though
 less. Where a result does not keep the bounds of contact, another pass begins with it, as a sequence of convex problems
-does (Schulman et al. 2014, Int. J. Robot. Res. 33, section III).
+does (Schulman et al. 2014, Int. J. Robot. Res. 33, section III). A pass that improves none of them does not count.
 """
 
 from typing import NamedTuple
@@ -85,6 +85,7 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
     """
     overlap, start = depths(captured.poses).max(axis=0), smoothed(cycle.clip)
     last, clip, shift = None, cycle.clip, np.zeros((cycle.clip.n_frames, 2))
+    before = np.full(3, np.inf)
     for _ in range(_MAX_PASSES):
         planted = without_foot_sliding(clip, smoothed(clip))
         shift = shift + (planted.poses - clip.poses)[:, :2]
@@ -98,12 +99,13 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
             and _range_excess(result.clip) < max(_range_excess(captured), 0.0) + _MAX_ADDED_EXCESS
         )
         near = alike and result.residual < MAX_RESIDUAL_IN_FLIGHTS
-        if last is not None and last.near and not near:
+        excess = _contact_excess(result.clip)
+        if last is not None and ((last.near and not near) or np.all(excess >= before)):
             break
         last = Attempt(cycle, _shifted(cycle.clip, shift), schedule, result.clip, result.residual, change, near)
-        if not alike or (near and _keeps_contact(result.clip)):
+        if not alike or (near and np.all(excess <= 1.0)):
             break
-        clip = result.clip
+        clip, before = result.clip, excess
     assert last is not None
     return last
 
@@ -135,7 +137,7 @@ def _range_excess(clip: Clip) -> float:
     return float(beyond_ranges(clip.poses).max())
 
 
-def _keeps_contact(clip: Clip) -> bool:
-    """Whether feet do not skate under load, and contact forces and torques within their limits drive the clip."""
+def _contact_excess(clip: Clip) -> Array:
+    """Ratios to their bounds of foot skate under load, of the residual force, and of a joint's torque, shape (3,)."""
     found = well_formed(clip, ())
-    return found.skate <= MAX_SKATE and found.residual <= MAX_RESIDUAL and found.strain <= 1.0
+    return np.array([found.skate / MAX_SKATE, found.residual / MAX_RESIDUAL, found.strain])

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from geometry.arrays import Array
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import attempt as passes
@@ -23,7 +24,7 @@ CYCLE = LoopedClip(CHEER, "cycle", 0.0, CHEER.duration, 0.0)
 
 
 def attempted(
-    monkeypatch: pytest.MonkeyPatch, residuals: list[float], keeps: list[bool], turn: float = 0.0
+    monkeypatch: pytest.MonkeyPatch, residuals: list[float], excesses: list[float], turn: float = 0.0
 ) -> tuple[Attempt, list[Clip]]:
     """An attempt whose optimiser turns every joint by an angle in each pass and leaves given residuals."""
     given: list[Clip] = []
@@ -35,38 +36,44 @@ def attempted(
         turned = Clip(add_tangents(clip.poses, tangents), clip.fps, clip.name)
         return Feasible(turned, residuals[len(given) - 1], ())
 
-    def keeps_contact(_: Clip) -> bool:
-        return keeps[len(given) - 1]
+    def contact_excess(_: Clip) -> Array:
+        return np.full(3, excesses[len(given) - 1])
 
     monkeypatch.setattr(passes, "feasible", optimised)
-    monkeypatch.setattr(passes, "_keeps_contact", keeps_contact)
+    monkeypatch.setattr(passes, "_contact_excess", contact_excess)
     return attempt(CYCLE, CHEER, CHEER.fps), given
 
 
-@pytest.mark.parametrize(("keeps", "count"), [([True], 1), ([False, True], 2), ([False, False, False], 3)])
+@pytest.mark.parametrize(("excesses", "count"), [([0.9], 1), ([2.0, 0.9], 2), ([3.0, 2.0, 1.5], 3)])
 def test_passes_continue_until_contact_is_kept_three_at_most(
-    keeps: list[bool], count: int, monkeypatch: pytest.MonkeyPatch
+    excesses: list[float], count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made, given = attempted(monkeypatch, [0.01] * 3, keeps, turn=0.02)
+    made, given = attempted(monkeypatch, [0.01] * 3, excesses, turn=0.02)
     assert len(given) == count
     assert made.near
     assert made.change.turned == pytest.approx(count * 0.02, rel=1e-2)  # from the capture, not from the last pass
 
 
 def test_pass_without_a_feasible_motion_does_not_replace_one_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    made, given = attempted(monkeypatch, [0.03, 0.2], [False, False])
+    made, given = attempted(monkeypatch, [0.03, 0.2], [2.0, 1.5])
     assert len(given) == 2
     assert (made.near, made.residual) == (True, 0.03)
 
 
+def test_pass_that_improves_no_measure_of_contact_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, given = attempted(monkeypatch, [0.01, 0.02], [2.0, 2.1])
+    assert len(given) == 2
+    assert made.residual == 0.01
+
+
 def test_large_residual_is_lowered_by_another_pass(monkeypatch: pytest.MonkeyPatch) -> None:
-    made, given = attempted(monkeypatch, [0.2, 0.03], [False, True])
+    made, given = attempted(monkeypatch, [0.2, 0.03], [2.0, 0.9])
     assert len(given) == 2
     assert (made.near, made.residual) == (True, 0.03)
 
 
 def test_motion_unlike_the_capture_ends_the_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
-    made, given = attempted(monkeypatch, [0.01, 0.01], [False, False], turn=0.6)
+    made, given = attempted(monkeypatch, [0.01, 0.01], [2.0, 1.5], turn=0.6)
     assert len(given) == 1
     assert not made.near
 
