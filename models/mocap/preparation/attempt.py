@@ -3,7 +3,7 @@
 A pass shifts the root so that supporting feet rest, low-passes, detects stances, and optimises. Contacts are thereby
 fixed before the optimisation: a foot that bears load while it was captured sliding slides in the result, too, though
 less. Where a result does not keep the bounds of contact, another pass begins with it, as a sequence of convex problems
-does (Schulman et al. 2014, Int. J. Robot. Res. 33, section III). A pass that improves none of them does not count.
+does (Schulman et al. 2014, Int. J. Robot. Res. 33, section III). A pass that hardly improves any does not count.
 """
 
 from typing import NamedTuple
@@ -23,6 +23,9 @@ from models.mocap.preparation.stances import Stances, stances, with_feet_at_rest
 from models.mocap.preparation.well_formed import well_formed
 
 _MAX_PASSES = 3
+# Ratio to which a pass has to lower one measure of contact: a punch whose feet skate by 7 mm is changed by another 1°
+# without it, and the third pass of a spin, which the figure follows with 7 instead of 16 %, has 0.4.
+_MIN_IMPROVEMENT = 0.9
 # RMS change of joints [rad] and of the root's height [m] beyond which the result counts as another motion. Of nine
 # captures that change by 5 to 24°, six look like the same motion in pictures, and the figure tracks none of the nine
 # worse than the capture; results more than 30° away also have a residual of 27 % of body weight or more. The root's
@@ -100,7 +103,7 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
         )
         near = alike and result.residual < MAX_RESIDUAL_IN_FLIGHTS
         excess = _contact_excess(result.clip)
-        if last is not None and ((last.near and not near) or np.all(excess >= before)):
+        if last is not None and ((last.near and not near) or np.all(excess > _MIN_IMPROVEMENT * before)):
             break
         last = Attempt(cycle, _shifted(cycle.clip, shift), schedule, result.clip, result.residual, change, near)
         if not alike or (near and np.all(excess <= 1.0)):
