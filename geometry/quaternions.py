@@ -53,6 +53,18 @@ def heading(q: Array) -> Array:
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def without_jumps(headings: Array, q: Array) -> Array:
+    """Headings (n,) of consecutive rotations q (n, 4) without jumps of 2π [rad].
+
+    Of a body that is upside down, as in a cartwheel, any heading winds around though the body does not turn: where its
+    z axis is more than 60° from the vertical, headings are interpolated.
+    """
+    upright = np.flatnonzero(1.0 - 2.0 * (q[:, 1] ** 2 + q[:, 2] ** 2) > 0.5)
+    if len(upright) in (0, len(q)):
+        return np.unwrap(headings)
+    return np.interp(np.arange(len(q)), upright, np.unwrap(headings[upright]))
+
+
 def exponential(v: Array) -> Array:
     """Rotations by rotation vectors [rad] of shape (..., 3), shape (..., 4)."""
     half = v / 2.0

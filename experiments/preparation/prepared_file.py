@@ -140,7 +140,8 @@ def changes(prepared: Prepared) -> tuple[str, ...]:
         "way back": "the whole motion, and back",
         "open": "the whole motion, at rest at both ends",
     }
-    headings = np.unwrap(quaternions.heading(prepared.clip.poses[:, 3:7]))
+    rotations = prepared.clip.poses[:, 3:7]
+    headings = quaternions.without_jumps(quaternions.heading(rotations), rotations)
     turn = np.rad2deg(headings[-1] - headings[0]) if part.kind == "cycle" else 0.0
     turning = f", turns {'left' if turn > 0.0 else 'right'} by {abs(turn):.0f}° in each lap"
     lines = [f"{words[part.kind]}{turning if abs(turn) > _MIN_LAP_TURN else ''}: {prepared.clip.duration:.2f} s"]

@@ -32,3 +32,24 @@ def test_continuous_logarithm_does_not_jump_beyond_half_a_turn() -> None:
     turn = quaternions.exponential(angles[:, None] * axis) * np.where(np.arange(90) % 7 < 3, -1.0, 1.0)[:, None]
     np.testing.assert_allclose(quaternions.continuous_logarithm(turn), angles[:, None] * axis, atol=1e-12)
     assert np.abs(np.diff(quaternions.logarithm(turn), axis=0)).max() > 3.0
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_headings_of_somersaults_and_cartwheels_count_no_turns(axis, side) -> None:
+    """Three turns about x or y that lean to a side, then half a turn about the vertical."""
+    angles = np.concatenate((np.linspace(0.0, 6.0 * np.pi, 360), np.full(60, 6.0 * np.pi)))
+    yaw = np.concatenate((np.zeros(360), np.linspace(0.0, np.pi, 60)))
+    lean = quaternions.about_axis(1 - axis, 0.1 * side * np.sin(angles / 2.0))
+    q = quaternions.product(
+        quaternions.about_axis(2, yaw), quaternions.product(quaternions.about_axis(axis, angles), lean)
+    )
+    headings = quaternions.without_jumps(quaternions.heading(q), q)
+    np.testing.assert_allclose([headings[0], headings[359], headings[-1]], [0.0, 0.0, np.pi], atol=0.05)
+
+
+def test_headings_of_an_upright_body_count_whole_turns() -> None:
+    yaw = np.linspace(0.0, 5.0 * np.pi, 100)
+    q = quaternions.product(quaternions.about_axis(2, yaw), quaternions.about_axis(0, np.full(100, 0.3)))
+    headings = quaternions.without_jumps(quaternions.heading(q), q)
+    np.testing.assert_allclose(headings - headings[0], yaw, atol=1e-9)

@@ -97,7 +97,7 @@ def frame_distances(clip: Clip, frames: IntArray) -> tuple[Array, Array]:
     )
     squares = (features**2).sum(axis=1)
     distance = np.maximum(squares[:, None] + squares - 2.0 * features @ features.T, 0.0)
-    return np.sqrt(distance / rotations.shape[1] * 4.0), np.unwrap(heading)
+    return np.sqrt(distance / rotations.shape[1] * 4.0), quaternions.without_jumps(heading, poses[:, 3:7])
 
 
 def foot_gaps(clip: Clip, planted: Mask, frames: IntArray) -> Array:
