@@ -12,7 +12,7 @@ from geometry.arrays import Array, IntArray, Mask
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.mirror import mirrored
-from models.mocap.preparation.laps import MAX_FOOT_GAP, best_lap, foot_gaps, frame_distances
+from models.mocap.preparation.laps import MAX_FOOT_GAP, MIN_LAP_TRAVEL, best_lap, foot_gaps, frame_distances
 
 # Largest d between the ends of a gait cycle, and of a cycle in place [rad]; walks have 0.1 to 0.3. Half the first loops
 # two of 17 captures differently, twice the first loops one; half the second changes none, twice the second takes a
@@ -41,6 +41,9 @@ _MIN_SPEED_RATIO = 0.7
 # Twice changes none of 17 captures, half leaves a run open.
 _MAX_MIRRORED_GAP = 0.25
 _MIN_HALF_STRIDE_TIME = 0.25  # least duration of half a stride [s]: sprinters take 0.22
+# Largest ratio, either way, of a lap's duration to that of half a stride if it holds one of them: nearer to one than to
+# two. Of 118 laps of windows of six walks 30 hold less than a stride; 29 of them are found, and no other.
+_MAX_DURATION_RATIO = 2.0**0.5
 _MIN_CYCLE_TIME = 0.6  # least duration of a cycle in place [s]: half or twice loops all of 19 captures the same way
 # Least duration of a cycle in place as a fraction of the clip's: shorter ones are tremor. Half loops all of 19 captures
 # the same way, twice one of them differently.
@@ -64,6 +67,15 @@ class Cycle(NamedTuple):
     last: int
     gap: float
     left_out: LeftOut
+
+
+class HalfStride(NamedTuple):
+    """First and last frame of half a stride, and d from its mirrored start to its end and to its start."""
+
+    first: int
+    last: int
+    gap: float
+    asymmetry: float
 
 
 def find_cycle(clip: Clip) -> Cycle | None:
@@ -115,8 +127,23 @@ def find_cycle(clip: Clip) -> Cycle | None:
     return None
 
 
-def find_half_stride(clip: Clip) -> tuple[int, int, float] | None:
-    """First frame, last frame and gap of the part whose end is most like its mirrored start; None if there is none."""
+def half_stride_instead(clip: Clip, cycle: Cycle) -> HalfStride | None:
+    """The half stride that the cycle of a gait is, if the clip is too short for a stride.
+
+    It takes about as long as the cycle, but its end is more like its mirrored start. A start that is like its own
+    mirror image, as in jumps, shows nothing.
+    """
+    if np.linalg.norm(clip.poses[cycle.last, :2] - clip.poses[cycle.first, :2]) < MIN_LAP_TRAVEL:
+        return None
+    half = find_half_stride(clip)
+    if half is None or not half.gap < cycle.gap < half.asymmetry:
+        return None
+    ratio = (cycle.last - cycle.first) / (half.last - half.first)
+    return half if 1.0 / _MAX_DURATION_RATIO < ratio < _MAX_DURATION_RATIO else None
+
+
+def find_half_stride(clip: Clip) -> HalfStride | None:
+    """The part whose end is most like its mirrored start; None if there is none."""
     frame_step = -(-2 * clip.n_frames // _COMPARED_FRAMES)
     frames = np.arange(0, clip.n_frames, frame_step)
     both = Clip(np.vstack((clip.poses, mirrored(clip).poses)), clip.fps, clip.name)
@@ -133,7 +160,7 @@ def find_half_stride(clip: Clip) -> tuple[int, int, float] | None:
     covered = np.minimum(direct, crossed)[:, i : j + 1].min(axis=1) < _MAX_COVERED_DISTANCE
     covered &= np.abs(_yaw_rates(inner, headings[: len(inner)], 2 * width)) < _MAX_YAW_RATE_DIFFERENCE / clip.fps
     fits = crossed[j, i] < _MAX_MIRRORED_GAP and covered.mean() >= _MIN_COVERED_FRACTION
-    return (int(inner[i]), int(inner[j]), float(crossed[j, i])) if fits else None
+    return HalfStride(int(inner[i]), int(inner[j]), float(crossed[j, i]), float(crossed[i, i])) if fits else None
 
 
 def _least_joint_turns(poses: Array, inside: Mask) -> Array:

@@ -15,7 +15,7 @@ from models.errors import ModelError
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.closing import closed_lap, is_in_place, with_way_back
 from models.mocap.preparation.coming_to_rest import REST_TIME, Ending, come_to_rest
-from models.mocap.preparation.cycles import LeftOut, find_cycle, find_half_stride
+from models.mocap.preparation.cycles import LeftOut, find_cycle, find_half_stride, half_stride_instead
 from models.mocap.preparation.laps import best_lap, frame_distances
 from models.mocap.preparation.poses import smoothed
 
@@ -94,10 +94,7 @@ def close_or_rest(
     """
     whole = (0, clip.n_frames - 1)
     if mirror:
-        half = find_half_stride(clip) if wish == "auto" else (*_requested_frames(clip, wish), np.nan)
-        if half is None:
-            raise ModelError(f"{clip.name}: --mirror, but no part of it ends like its start mirrored; expected a gait")
-        return _close(clip, *half, half=True)
+        return _close_mirrored(clip, wish)
     if clip.n_frames < 8 or wish == "open":
         return _bring_to_rest(clip, ending)
     if wish == "lap":
@@ -113,13 +110,31 @@ def close_or_rest(
     gap = _gap(clip, *whole)
     if wraps and gap < _MAX_DECLARED_GAP:
         return _close(clip, *whole, gap)
-    if (cycle := find_cycle(clip)) is not None:
-        return _close(clip, cycle.first, cycle.last, cycle.gap)._replace(left_out=cycle.left_out)
+    if (cycle := _close_cycle(clip)) is not None:
+        return cycle
     if is_in_place(clip):
         return LoopedClip(with_way_back(clip), "way back", 0.0, clip.duration, gap)
     if _is_fast(clip) and (half := find_half_stride(clip)) is not None:
-        return _close(clip, *half, half=True)
+        return _close(clip, half.first, half.last, half.gap, half=True)
     return _bring_to_rest(clip, ending)
+
+
+def _close_mirrored(clip: Clip, wish: str) -> LoopedClip:
+    """The part that the user wishes, or half a stride, continued by its mirror image."""
+    if wish != "auto":
+        return _close(clip, *_requested_frames(clip, wish), np.nan, half=True)
+    if (half := find_half_stride(clip)) is None:
+        raise ModelError(f"{clip.name}: --mirror, but no part of it ends like its start mirrored; expected a gait")
+    return _close(clip, half.first, half.last, half.gap, half=True)
+
+
+def _close_cycle(clip: Clip) -> LoopedClip | None:
+    """The cycle of the clip, or the half stride that it is, closed; None if there is none."""
+    if (cycle := find_cycle(clip)) is None:
+        return None
+    if (half := half_stride_instead(clip, cycle)) is not None:
+        return _close(clip, half.first, half.last, half.gap, half=True)
+    return _close(clip, cycle.first, cycle.last, cycle.gap)._replace(left_out=cycle.left_out)
 
 
 def _requested_frames(clip: Clip, wish: str) -> tuple[int, int]:
@@ -153,7 +168,8 @@ def _lost_turn(clip: Clip, first: int, last: int, half: bool) -> LostTurn:
 
     A pelvis swings to and fro with the legs: between two phases of a straight walk its heading differs by 40°.
     """
-    headings = np.unwrap(quaternions.heading(clip.poses[:, 3:7]))
+    rotations = clip.poses[:, 3:7]
+    headings = quaternions.without_jumps(quaternions.heading(rotations), rotations)
     rate = 0.0 if half else (headings[last] - headings[first]) / (last - first)
     relative = headings - rate * np.arange(clip.n_frames)
     own = relative[first : last + 1]

@@ -25,6 +25,18 @@ def test_lap_of_a_walk_is_found_and_closed(walks):
     assert found.clip.duration == pytest.approx(walk.duration / 2, abs=0.03)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.2])
+def test_walk_of_less_than_a_stride_is_continued_by_its_mirror_image(start):
+    """Two moments of it, each with a foot in the air, are similar enough for a gait's ends; a cycle would limp."""
+    walk = resampled(embedded("walk"), 120.0)
+    stride = walk.duration / 2.0
+    first, last = (round((start + part) * stride * walk.fps) for part in (0.0, 0.75))
+    found = close_or_rest(Clip(walk.poses[first : last + 1], walk.fps, "less than a stride"))
+    assert found.kind == "half stride"
+    assert found.clip.closes()
+    assert found.clip.duration == pytest.approx(stride, abs=0.1 * stride)
+
+
 def test_run_on_the_spot_whose_ends_differ_by_a_rounded_ankle_is_closed_as_a_whole():
     """A stride at 24 frames a second: d of its ends is large, as their velocities are one-sided."""
     lap = resampled(embedded("run"), 24.0).poses[:18]
