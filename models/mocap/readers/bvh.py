@@ -22,7 +22,7 @@ from models.mocap.readers.motion_file import (
     numbers,
     quoted,
 )
-from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.readers.source_motion import MAX_GAP_TIME, SourceMotion
 
 _MAX_ZERO_RATIO = 1e-3  # largest displacement of a joint, as a fraction of its OFFSET, that counts as zero
 # Median relative difference of bones from the lengths of their OFFSETs: above the first value, positions are not given
@@ -35,6 +35,7 @@ _RADIANS_REMARK = (
     "no rotation in the file exceeds 6.3: BVH has degrees, in which this body hardly moves; if these are radians, "
     "multiply them by 57.3"
 )
+_NAN = re.compile(r"(?<!\S)[+-]?nan(?!\S)", re.IGNORECASE)
 _CHANNEL = re.compile(r"([xyz])(position|rotation)", re.IGNORECASE)
 
 
@@ -248,7 +249,9 @@ def _read_end_site(tokens: _Tokens) -> list[float]:
 def _read_frames(
     lines: Iterator[tuple[int, str]], n_joints: int, n_columns: int, path: Path
 ) -> tuple[Array, float, tuple[str, ...]]:
-    """The frames' channels, shape (frames, channels), their rate, and a remark if there is one more than declared.
+    """The frames' channels, shape (frames, channels), their rate, and remarks on frames that are lost or not declared.
+
+    A frame that lost numbers (``nan``) repeats the one before; `repeated_frames` interpolates it.
 
     Exporters miscount by one, or write a reference pose in front that they do not count. The file does not say which
     frame is the extra one, so all are read. More lines than that mean a damaged file.
@@ -265,7 +268,7 @@ def _read_frames(
     if match is None:
         raise MotionFileError(path, line, f"found {quoted(text.strip())} after Frames", "Frame Time: seconds")
     fps = frame_rate(number(match[1], path, line), path, line)
-    values, found = array("d"), 0
+    values, found, lost = array("d"), 0, _Lost(max(1, int(MAX_GAP_TIME * fps)))
     for line, text in rest:
         tokens = text.split()
         found += 1
@@ -274,7 +277,7 @@ def _read_frames(
             raise MotionFileError(path, line, what, "as many as Frames says")
         if len(tokens) != n_columns:
             raise MotionFileError(path, line, f"frame of {len(tokens)} numbers", f"{n_columns}, one a channel")
-        values.extend(numbers(tokens, path, line))
+        values.extend(values[-n_columns:] if lost.follows(text, found, line) else numbers(tokens, path, line))
     # The frames of a skeleton without channels are empty lines, which are skipped.
     if found < n_frames and n_columns:
         raise MotionFileError(path, line, f"file ends after {found} of {n_frames} frames", f"{n_frames} lines")
@@ -282,7 +285,30 @@ def _read_frames(
         f"the file has {_frame_count_text(found)}, one more than the {n_frames} it declares: the last one is read, too"
     )
     frames = np.array(values).reshape(max(found, n_frames), n_columns)
-    return frames, fps, (note,) if found > n_frames else ()
+    return frames, fps, (*((note,) if found > n_frames else ()), *lost.remarks())
+
+
+class _Lost:
+    """Frames without some number, written as nan, of which at most `longest` in a row repeat the one before."""
+
+    def __init__(self, longest: int) -> None:
+        self.longest, self.frames = longest, dict[int, int]()  # their lines, by frame
+
+    def follows(self, text: str, frame: int, line: int) -> bool:
+        """Whether a frame, with this text in this line, is lost and can repeat the one before."""
+        if frame < 2 or _NAN.search(text) is None:
+            return False
+        if all(frame - k in self.frames for k in range(1, self.longest + 1)):
+            return False
+        self.frames[frame] = line
+        return True
+
+    def remarks(self) -> tuple[str, ...]:
+        """A line that names the first one."""
+        if not self.frames:
+            return ()
+        first, n = min(self.frames.values()), len(self.frames)
+        return (f"{_frame_count_text(n)} {'lacks' if n == 1 else 'lack'} numbers (nan), the first in line {first}",)
 
 
 def _frame_count_text(n: int) -> str:

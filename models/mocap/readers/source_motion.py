@@ -10,6 +10,7 @@ import numpy.typing as npt
 from geometry import quaternions
 from geometry.arrays import Array
 
+MAX_GAP_TIME = 0.1  # longest gap that is interpolated [s]
 _MAX_ZERO_ROTATION = 1e-4  # half the largest angle [rad] that counts as zero: files have four decimals
 
 

@@ -14,10 +14,9 @@ from scipy.interpolate import CubicSpline
 
 from geometry import quaternions
 from geometry.arrays import Array, Mask
-from models.mocap.readers.source_motion import SourceMotion
+from models.mocap.readers.source_motion import MAX_GAP_TIME, SourceMotion
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
 
-MAX_GAP_TIME = 0.1  # longest gap that is interpolated [s]
 # Least ratio of a gap's jumps to the 95th percentile of the joint's steps, and of a single frame's distance from the
 # middle of its neighbours to the 95th percentile of such distances. In the captures of
 # docs/validation/prepared-captures.md and the embedded clips, at their own rates and down to 15 Hz, joints that turn

@@ -6,8 +6,8 @@ import numpy as np
 
 from geometry.arrays import Mask
 from geometry.spans import spans
-from models.mocap.readers.source_motion import SourceMotion
-from models.mocap.retargeting.broken_frames import MAX_GAP_TIME, MIN_FRAME_COUNT, interpolated
+from models.mocap.readers.source_motion import MAX_GAP_TIME, SourceMotion
+from models.mocap.retargeting.broken_frames import MIN_FRAME_COUNT, interpolated
 
 _THROUGHOUT = 0.1  # share of the frames: 24 frames a second among 30 repeat a fifth, 25 among 30 a sixth
 

@@ -60,7 +60,7 @@ MALFORMED = {
         "no motion": (BVH[: BVH.index("MOTION")], "x.bvh:18: file ends in the hierarchy; expected MOTION"),
         "something else than motion": (BVH.replace("MOTION", "MUTION"), "x.bvh:19: found 'MUTION'"),
         "unclosed": (BVH[: BVH.index("  JOINT Right")], "x.bvh:11: file ends in the hierarchy; expected }"),
-        "nan": (BVH.replace("0 8 1 1", "0 nan 1 1"), "x.bvh:23: 'nan' is not a number"),
+        "nan": (BVH.replace("0 8 0 1", "0 nan 0 1"), "x.bvh:22: 'nan' is not a number"),
         "infinity": (BVH.replace("0 8 1 1", "0 inf 1 1"), "x.bvh:23: 'inf' is not a number"),
         "two roots": (
             BVH.replace("MOTION", "ROOT B\nMOTION"),
@@ -131,7 +131,7 @@ MALFORMED = {
         "empty": ("", "x.bvh:1: file is empty"),
         "blank": (" \n\t\r\n", "x.bvh:1: file is empty"),
         "binary": (b"HIERARCHY\nROOT\0\0\x01", "x.bvh:2: binary content"),
-        "utf-16, malformed": (BVH.replace("0 8 1 1", "0 nan 1 1").encode("utf-16"), "x.bvh:23: 'nan' is not a number"),
+        "utf-16, malformed": (BVH.replace("0 8 0 1", "0 nan 0 1").encode("utf-16"), "x.bvh:22: 'nan' is not a number"),
         "utf-16 without its mark": (BVH.encode("utf-16-le"), "x.bvh:1: binary content"),
         "utf-16, cut off": (BVH.encode("utf-16")[:-41], "x.bvh:23: "),
         "utf-32": (BVH.encode("utf-32"), "x.bvh:1: binary content"),

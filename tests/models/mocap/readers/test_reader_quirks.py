@@ -12,6 +12,7 @@ from models.mocap.readers.asf_amc import read_amc
 from models.mocap.readers.bvh import read_bvh
 from models.mocap.readers.deepmimic import read_deepmimic
 from models.mocap.readers.formats import read_motion
+from models.mocap.readers.motion_file import MotionFileError
 from tests.models.mocap.readers.motion_files import BVH
 
 CHAIN = """HIERARCHY
@@ -158,6 +159,20 @@ def test_bvh_frame_beyond_the_declared_number_is_read_and_remarked(tmp_path):
     np.testing.assert_array_equal(joint_positions(motion), joint_positions(read_text(tmp_path, CHAIN)))
     assert motion.remarks == ("the file has 2 frames, one more than the 1 it declares: the last one is read, too",)
     assert read_text(tmp_path, CHAIN).remarks == ()
+
+
+def test_bvh_frame_that_lost_numbers_repeats_the_one_before(tmp_path):
+    """At 25 frames a second two in a row may, as they last less than 0.1 s; the first frame has none before."""
+    rows = ["0 0 0 1 2 3 4 5 6\n", "0 nan 0 1 2 3 4 5 7\n", "0 0 0 NaN -nan 3 4 5 8\n", "0 0 1 1 2 3 4 5 9\n"]
+    whole = CHAIN[: CHAIN.index("Frames:")] + "Frames: 4\nFrame Time: 0.04\n"
+    motion = read_text(tmp_path, whole + "".join(rows))
+    np.testing.assert_array_equal(motion.rotations[1:3], motion.rotations[[0, 0]])
+    np.testing.assert_array_equal(motion.translations[1:3], motion.translations[[0, 0]])
+    line = whole.count("\n") + 2
+    assert motion.remarks == (f"2 frames lack numbers (nan), the first in line {line}",)
+    for order, lost in (([1, 0, 0, 3], 1), ([0, 1, 1, 1], 4)):
+        with pytest.raises(MotionFileError, match=f":{line - 2 + lost}: 'nan' is not a number"):
+            read_text(tmp_path, whole + "".join(rows[k] for k in order))
 
 
 def test_bvh_whose_angles_may_be_in_radians_is_remarked(tmp_path):
