@@ -42,7 +42,7 @@ _MIN_SPEED_RATIO = 0.7
 _MAX_MIRRORED_GAP = 0.25
 _MIN_HALF_STRIDE_TIME = 0.25  # least duration of half a stride [s]: sprinters take 0.22
 # Largest ratio, either way, of a lap's duration to that of half a stride if it holds one of them: nearer to one than to
-# two. Of 61 laps of windows of eleven walks that hold less than a stride 48 are found; none of 140 that hold one is
+# two. Of 61 laps of windows of twelve gaits that hold less than a stride 48 are found; none of 140 that hold one is
 # taken for half, and none of 69 of windows of jumps, side skips and a walk with turns.
 _MAX_DURATION_RATIO = 2.0**0.5
 _MIN_CYCLE_TIME = 0.6  # least duration of a cycle in place [s]: half or twice loops all of 19 captures the same way
