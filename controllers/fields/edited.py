@@ -1,7 +1,6 @@
 """Edited rivers V + U: a river V plus a field U recorded from a user's motion on it (Donald & Henle 2000, 2.3)."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Literal, NamedTuple
@@ -15,7 +14,6 @@ from controllers.curves.trajectory import END, START, Trajectory, curve_point, c
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.algebra.weights import window
-from controllers.fields.bundle import RiverBundle
 from controllers.fields.follow import FollowGains, follow_at
 from controllers.fields.river import River
 from controllers.state import HAND_POSITION, HAND_TIME, MAX_TIME_STEP
@@ -184,33 +182,3 @@ class Edited(Law):
                 current = self.river.flow(t, np.array(curve_point(curve, 0, t)))
                 total += share * (curve_velocity(curve, 0, t) - current)
         return total
-
-    def arrays(self) -> dict[str, Array]:
-        """The field as arrays by key; `from_arrays` restores it from them bit for bit."""
-        numbers = np.array([self.epsilon, float(self.pace == "wait"), *self.weights])
-        arrays = RiverBundle((self.river,), ("river",)).arrays() | {"edited": numbers}
-        for i, curve in enumerate(self.performed):
-            arrays[f"performed {i}"] = np.column_stack((np.asarray(curve.times), np.asarray(curve.positions)))
-        return arrays
-
-    @staticmethod
-    def from_arrays(arrays: Mapping[str, Array]) -> "Edited":
-        """Field restored from the output of `arrays`.
-
-        Raises
-        ------
-        ControllerError
-            If an array is missing, or its values are not those of a field.
-        """
-        numbers = arrays.get("edited", np.zeros(0))
-        names = [f"performed {i}" for i in range(numbers.size - 2)]
-        missing = [name for name in ("edited", *names) if name not in arrays]
-        if missing or numbers.ndim != 1 or numbers.size < 2:
-            raise ParameterError(f"an edited field needs the arrays {', '.join(missing) or 'edited, with two numbers'}")
-        river = RiverBundle.from_arrays({k: v for k, v in arrays.items() if k.startswith("river/")})["river"]
-        for name in names:
-            if arrays[name].ndim != 2 or arrays[name].shape[1] != 4:
-                raise ParameterError(f"{name} of an edited field has shape {arrays[name].shape}, expected (n, 4)")
-        performed = tuple(Trajectory(arrays[name][:, 0], arrays[name][:, 1:]) for name in names)
-        epsilon, waits = float(numbers[0]), bool(numbers[1])
-        return Edited(river, performed, tuple(numbers[2:].tolist()), epsilon, "wait" if waits else "clock")

@@ -135,18 +135,6 @@ def test_force_and_flow_are_finite_everywhere(p, v, t):
         assert np.isfinite(field.flow(t, np.array(p))).all()
 
 
-def test_field_round_trips_through_arrays():
-    field = Edited(RIVER, (PERFORMED, PERFORMED), (0.3, -1.0), 0.02, "wait")
-    arrays = field.arrays()
-    np.testing.assert_array_equal(Edited.from_arrays(arrays).program().params, field.program().params)
-    assert Edited.from_arrays(arrays).pace == "wait"
-    broken = {key: value for key, value in arrays.items() if key != "performed 1"}
-    with pytest.raises(ParameterError, match="performed 1"):
-        Edited.from_arrays(broken)
-    with pytest.raises(ParameterError, match="edited"):
-        Edited.from_arrays({})
-
-
 def test_invalid_arguments_raise_parameter_error():
     with pytest.raises(ParameterError, match="1 performances need as many"):
         Edited(RIVER, (PERFORMED,), (1.0, 2.0))

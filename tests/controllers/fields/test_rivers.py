@@ -111,20 +111,6 @@ def test_bundle_is_the_sum_of_its_rivers_and_indexes_them_by_name():
         RiverBundle(tuple(RIVERS), ("same", "same"))
 
 
-def test_bundle_round_trips_through_arrays():
-    path = Trajectory([0.0, 0.5, 1.0], [[0, 0, 0], [0.02, 0.01, 0], [0.05, 0, 0.01]], ends="clamped")
-    rivers = (*RIVERS, River(path, 0.01, 0.1, 2.0, [[0.01, 0.05], [0.02, 0.1]]))
-    bundle = RiverBundle(rivers, ("circle", "knot", "a/path"))
-    arrays = bundle.arrays()
-    again = RiverBundle.from_arrays(arrays)
-    assert again.names == bundle.names
-    np.testing.assert_array_equal(again.program().params, bundle.program().params)
-    np.testing.assert_array_equal(again["a/path"].speeds, rivers[2].speeds)
-    del arrays["knot/times"]
-    with pytest.raises(ParameterError, match="'knot' of the bundle lacks times"):
-        RiverBundle.from_arrays(arrays)
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
