@@ -9,15 +9,17 @@ from controllers.legs.limbs import Limb
 from geometry.arrays import Array
 
 
-def clip_arrays(clips: Sequence[tuple[Array, float]], names: Sequence[str], limbs: Sequence[Limb]) -> dict[str, Array]:
+def clip_arrays(
+    clips: Sequence[tuple[Array, float]], names: Sequence[str | int], limbs: Sequence[Limb]
+) -> dict[str, Array]:
     """Arrays by key: ``clip/name/poses`` and ``clip/name/fps``, ``limb/k/what``.
 
     Parameters
     ----------
     clips : sequence of (Array, float)
         Poses (n, nq) and frames per second.
-    names : sequence of str
-        Names of the clips, all different.
+    names : sequence of str or int
+        Names or numbers of the clips, all different.
     limbs : sequence of Limb
     """
     arrays: dict[str, Array] = {}

@@ -1,6 +1,6 @@
 """Base classes of the maps that blend clips: clips become loops, and a lap of the hand plays a lap of every clip."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from functools import lru_cache
 from typing import ClassVar, NamedTuple, Self
@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from controllers.blending.blend import packed_blend
-from controllers.blending.clip_arrays import clip_arrays, stored_array
+from controllers.blending.clip_arrays import clip_arrays
 from controllers.blending.combination import fresh_lap
 from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
@@ -27,19 +27,15 @@ class ClipMap(KernelMap):
         As in `KernelMap`.
     clips : sequence of (Array, float)
         Clips that the map is made of: poses (n, nq) and frames per second.
-    names : sequence of str
-        Names of the clips, all different.
     limbs : sequence of Limb
         Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
     """
 
-    def __init__(
-        self, params: Array, clips: Sequence[tuple[Array, float]], names: Sequence[str], limbs: Sequence[Limb]
-    ) -> None:
+    def __init__(self, params: Array, clips: Sequence[tuple[Array, float]], limbs: Sequence[Limb]) -> None:
         super().__init__(params)
         # Stored as given, so that a map rebuilt from them is the same bit for bit.
         self.clips = tuple((np.array(poses, dtype=np.float64), float(fps)) for poses, fps in clips)
-        self.names, self.limbs = tuple(names), tuple(limbs)
+        self.limbs = tuple(limbs)
 
     @property
     def nq(self) -> int:
@@ -56,10 +52,6 @@ class ClipMap(KernelMap):
         return fresh_lap()
 
 
-def _numbered(clips: Sequence[tuple[Array, float]]) -> list[str]:
-    return [str(i) for i in range(len(clips))]
-
-
 class _Ingredients:
     """All that a blend is made of, equal to others of the same numbers."""
 
@@ -68,7 +60,7 @@ class _Ingredients:
         lap: float | None, apart: bool,
     ) -> None:  # fmt: skip
         self.clips, self.second_group, self.limbs, self.lap, self.apart = clips, second_group, limbs, lap, apart
-        arrays = clip_arrays(clips, _numbered(clips), limbs).items()
+        arrays = clip_arrays(clips, range(len(clips)), limbs).items()
         self._numbers = second_group, lap, apart, tuple((key, array.shape, array.tobytes()) for key, array in arrays)
 
     def __eq__(self, other: object) -> bool:
@@ -150,7 +142,7 @@ class AnimationMap(ClipMap):
         self.lap, self.second_group = lap, tuple(second_group)
         blended = _blended(_Ingredients(clips, self.second_group, limbs, lap, apart))
         self.loops: list[Loop] = list(blended.loops)
-        super().__init__(np.concatenate([numbers, blended.params]), clips, _numbered(clips), blended.limbs)
+        super().__init__(np.concatenate([numbers, blended.params]), clips, blended.limbs)
 
     @property
     def laps(self) -> int:
@@ -182,28 +174,8 @@ class AnimationMap(ClipMap):
         other._params[self.share_at] = other.share = share
         return other
 
-    def lap_array(self) -> dict[str, Array]:
-        """The lap that the map was made for, as an array by key; empty without one."""
-        return {} if self.lap is None else {"lap": np.array([self.lap])}
-
 
 def arms_of_others(share: float) -> str:
     """In words, at the end of a remark, which share of the others' arm motion is combined with one clip's legs."""
     alone = "" if share > 0.0 else ": one clip plays alone, and the hand changes nothing but its pace"
     return "the others' arm motion" if share == 1.0 else f"{100 * share:.0f} % of the others' arm motion{alone}"
-
-
-def stored_lap(arrays: Mapping[str, Array]) -> float | None:
-    """The lap [s] in the output of `lap_array`, or None.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a positive number.
-    """
-    if "lap" not in arrays:
-        return None
-    lap = float(stored_array(arrays, "lap", (1,))[0])
-    if not 0.0 < lap < np.inf:
-        raise ParameterError(f"'lap' of the map must be positive and finite, got {lap}")
-    return lap

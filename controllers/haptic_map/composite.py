@@ -1,15 +1,13 @@
 """The red-blue composite map: legs of one clip, arms blended of two others (Donald & Henle 2000, Figs. 5 to 7)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-import numpy as np
 from numba import njit
 
 from controllers.blending.blend import blend
-from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
+from controllers.haptic_map.animation import AnimationMap, arms_of_others
 from controllers.legs.limbs import Limb
 from controllers.work_array import work_array
 from geometry.arrays import Array
@@ -100,30 +98,3 @@ class Composite(AnimationMap):
     def lap_seconds(self) -> float:
         """As in `AnimationMap`."""
         return self.loops[0].duration
-
-    def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
-        numbers = {"r_range": np.array(self.r_range), "upper_joints": np.array(self.upper_joints, dtype=np.float64)}
-        numbers["share"] = np.array([self.share])
-        if self.apart:
-            numbers["apart"] = np.ones(1)
-        return numbers | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
-
-    @staticmethod
-    def from_arrays(arrays: Mapping[str, Array]) -> "Composite":
-        """Map restored from the output of `arrays`.
-
-        Raises
-        ------
-        ParameterError
-            If an array is missing, or its values are not those of a map.
-        """
-        clips, joints = stored_clips(arrays), stored_array(arrays, "upper_joints", (None,))
-        if len(clips) != _CLIPS or not np.isfinite(joints).all():
-            raise ParameterError(f"a composite map has {_CLIPS} clips and joints, got {len(clips)} and {joints}")
-        lower, red, blue = clips
-        r_low, r_high = stored_array(arrays, "r_range", (2,)).tolist()
-        upper, limbs = [int(joint) for joint in joints], stored_limbs(arrays)
-        share = float(stored_array(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        result = Composite(lower, red, blue, upper, (r_low, r_high), limbs, stored_lap(arrays), "apart" in arrays)
-        return result.with_share(share) if upper else result

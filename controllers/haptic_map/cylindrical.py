@@ -1,19 +1,19 @@
 """The cylindrical map: the angle is the phase, radius and height blend four clips (Donald & Henle 2000, Fig. 3)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from controllers.blending.alignment import aligned_channels
 from controllers.blending.blend import blend_corrected
-from controllers.blending.clip_arrays import clip_arrays, stored_array, stored_clips, stored_limbs
 from controllers.blending.combination import Mixture
 from controllers.curves.cylinder import AXIS, blend_weight, checked_interval, cylinder, eased_weight
 from controllers.errors import ParameterError
-from controllers.haptic_map.animation import AnimationMap, arms_of_others, stored_lap
+from controllers.haptic_map.animation import AnimationMap, arms_of_others
 from controllers.legs.footfalls import foot_corrections
 from controllers.legs.limb_ends import with_ends
 from controllers.legs.limbs import Limb
@@ -23,7 +23,6 @@ from controllers.work_array import work_array
 from geometry.arrays import Array
 
 _CLIPS = 4
-_CLIP_NAMES = ("the first clip", "the second clip", "the third clip", "the fourth clip")
 _R_MIN, _R_MAX, _Z_MIN, _Z_MAX, _LEGS_OF, _SHARE, _TABLE_SIZE, _TABLE = range(8)
 # Nodes of the table of corrections along each of r and z: a blend of cheer and ginga slides 1.0 cm, also with 9 and 17;
 # one of walk, run, ginga and cheer, which no map blends as a whole, slides 7.5 cm, with 9 and 17 nodes 6.0 and 5.4 cm.
@@ -90,6 +89,24 @@ def _table_of_zeros(shape: tuple[int, ...]) -> Array:
     return packed_table(np.zeros(shape))
 
 
+class LegsOfOneClip(NamedTuple):
+    """Root, trunk and legs of one clip, with the other clips blended into arms and head only.
+
+    Attributes
+    ----------
+    clip : int
+        Number of the clip, counted from 0.
+    upper : sequence of int
+        The joints that are blended, counted from 1.
+    name : str
+        What remarks call the clip.
+    """
+
+    clip: int
+    upper: Sequence[int]
+    name: str = "one clip"
+
+
 class Cylindrical(AnimationMap):
     r"""Four clips round a cylinder about the z axis of H.
 
@@ -100,7 +117,7 @@ class Cylindrical(AnimationMap):
     feet in stance keep their places (`stance_hold`).
 
     The mean of clips with different footsteps is not a gait: while one clip plants a foot, another lifts it. With
-    `upper`, only those joints are blended; root, legs and feet are those of one clip everywhere. Where that clip's legs
+    `LegsOfOneClip`, root, legs and feet are those of one clip everywhere. Where that clip's legs
     cannot support more, only a share λ of the others' joints is blended in: the weights are λ w_i, plus 1 − λ for
     that clip.
 
@@ -124,10 +141,8 @@ class Cylindrical(AnimationMap):
         `corrections` of a map of the same clips, limbs and lap, to spare computing them again.
     lap : float, optional
         Duration of the hand's lap [s], in which each clip is played as often as it fits (`strides`); by default once.
-    upper : sequence of int
-        The only joints that are blended, counted from 1; by default all.
-    legs_of : int
-        With `upper`, the clip that gives legs and root, counted from 0.
+    legs : LegsOfOneClip, optional
+        The clip that gives root and legs everywhere, and the joints that are still blended; by default all are.
 
     Attributes
     ----------
@@ -139,8 +154,6 @@ class Cylindrical(AnimationMap):
         ξ of each clip.
     share : float
         λ (see `with_share`).
-    called : tuple of four str
-        What remarks call the clips; it may be set.
 
     Raises
     ------
@@ -150,7 +163,6 @@ class Cylindrical(AnimationMap):
 
     map_kernel = staticmethod(cylindrical_map)
     share_at = _SHARE
-    called: tuple[str, ...] = _CLIP_NAMES
 
     def __init__(
         self,
@@ -160,8 +172,7 @@ class Cylindrical(AnimationMap):
         limbs: Sequence[Limb] = (),
         corrections: Array | None = None,
         lap: float | None = None,
-        upper: Sequence[int] = (),
-        legs_of: int = 0,
+        legs: LegsOfOneClip | None = None,
     ) -> None:
         if len(clips) != _CLIPS:
             raise ParameterError(
@@ -169,12 +180,11 @@ class Cylindrical(AnimationMap):
             )
         self.r_range, self.z_range = r_range, z_range
         numbers = (*checked_interval("r_range", r_range, AXIS), *checked_interval("z_range", z_range, -np.inf))
-        if not 0 <= legs_of < _CLIPS:
-            raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs_of}")
-        self.upper, self.legs_of = tuple(upper), legs_of
-        legs = 1.0 + legs_of if self.upper else 0.0
-        super().__init__(clips, (*numbers, legs, 1.0, 0.0), upper, limbs, lap,
-                         len(self.upper) > 0)  # fmt: skip
+        if legs is not None and not 0 <= legs.clip < _CLIPS:
+            raise ParameterError(f"legs are of clip 0 to {_CLIPS - 1}, got {legs.clip}")
+        self.legs = legs
+        owner, upper = (0.0, ()) if legs is None else (1.0 + legs.clip, legs.upper)
+        super().__init__(clips, (*numbers, owner, 1.0, 0.0), upper, limbs, lap, legs is not None)
         self._intervals = numbers
         self._nodes, self.mixtures = (values.copy() for values in _mixtures())
         self.drifts: Array = np.stack([loop.drift for loop in self.loops])
@@ -184,12 +194,12 @@ class Cylindrical(AnimationMap):
 
     def fresh_memory(self) -> Array:
         """As in `ClipMap`, and a footing where legs are blended."""
-        if self.upper or not self.limbs:
+        if self.legs or not self.limbs:
             return super().fresh_memory()
         return np.concatenate([super().fresh_memory(), fresh_footing(len(self.limbs))])
 
     def _compute_corrections(self, limbs: Sequence[Limb]) -> Array:
-        if self.upper:
+        if self.legs:
             return np.zeros((_MAX_ROWS, *correction_shape(len(limbs))))
         rows = int(np.clip(max(loop.share * len(loop.splines[0].x) for loop in self.loops), 64, _MAX_ROWS))
         channels = with_ends(aligned_channels(self.loops, rows, limbs), self.drifts, limbs)
@@ -203,11 +213,16 @@ class Cylindrical(AnimationMap):
         self.corrections = values
 
     @property
+    def legs_of(self) -> int | None:
+        """Clip that gives root and legs, counted from 0; None if all joints are blended."""
+        return None if self.legs is None else self.legs.clip
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """A remark if only some joints are blended."""
-        if not self.upper:
+        if self.legs is None:
             return ()
-        remark = f"the clips are too different to average, so legs and trunk are those of {self.called[self.legs_of]}"
+        remark = f"the clips are too different to average, so legs and trunk are those of {self.legs.name}"
         if self.share < 1.0:
             remark += f", with {arms_of_others(self.share)}"
         return (remark,)
@@ -215,12 +230,14 @@ class Cylindrical(AnimationMap):
     @property
     def lap_durations(self) -> Array:
         """As in `AnimationMap`; only that of the legs' clip if no other is blended in."""
-        return super().lap_durations if self.share > 0.0 else np.array([self.loops[self.legs_of].duration])
+        if self.legs is None or self.share > 0.0:
+            return super().lap_durations
+        return np.array([self.loops[self.legs.clip].duration])
 
     @property
     def lap_seconds(self) -> float:
         """As in `AnimationMap`."""
-        return self.loops[self.legs_of].duration if self.upper else super().lap_seconds
+        return self.loops[self.legs.clip].duration if self.legs else super().lap_seconds
 
     def places(self, angles: Array) -> Array:
         """Upright stylus poses (k, n, 7) at which the weights are those of the mixtures, at angles θ (n,)."""
@@ -245,37 +262,3 @@ class Cylindrical(AnimationMap):
         values[..., :ROOT] = np.fft.irfft(np.fft.rfft(sway, axis=0) * (rows / len(sway)), rows, axis=0)
         other._set_corrections(values)
         return other
-
-    def arrays(self) -> dict[str, Array]:
-        """The map as arrays by key; `from_arrays` restores it from them bit for bit."""
-        arrays = {"domain": np.array([self.r_range, self.z_range])}
-        if self.upper:
-            arrays["upper_joints"] = np.array(self.upper, dtype=np.float64)
-            arrays["legs_of"], arrays["share"] = np.array([float(self.legs_of)]), np.array([self.share])
-        if self.limbs:
-            arrays["corrections"] = self.corrections
-        return arrays | self.lap_array() | clip_arrays(self.clips, self.names, self.limbs)
-
-    @staticmethod
-    def from_arrays(arrays: Mapping[str, Array]) -> "Cylindrical":
-        """Map restored from the output of `arrays`.
-
-        Raises
-        ------
-        ParameterError
-            If an array is missing, or its values are not those of a map.
-        """
-        (r_low, r_high), (z_low, z_high) = stored_array(arrays, "domain", (2, 2)).tolist()
-        limbs, corrections = stored_limbs(arrays), None
-        if limbs:
-            corrections = stored_array(arrays, "corrections", (None, *correction_shape(len(limbs))))
-        upper = stored_array(arrays, "upper_joints", (None,)) if "upper_joints" in arrays else np.zeros(0)
-        if not np.isfinite(upper).all():
-            raise ParameterError(f"'upper_joints' of the map must be finite, got {upper}")
-        clips, joints = stored_clips(arrays), [int(joint) for joint in upper]
-        owner = int(stored_array(arrays, "legs_of", (1,))[0]) if "legs_of" in arrays else 0
-        share = float(stored_array(arrays, "share", (1,))[0]) if "share" in arrays else 1.0
-        result = Cylindrical(
-            clips, (r_low, r_high), (z_low, z_high), limbs, corrections, stored_lap(arrays), joints, owner
-        )  # fmt: skip
-        return result.with_share(share) if joints else result

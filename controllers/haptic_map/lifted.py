@@ -111,7 +111,8 @@ class Lifted(ClipMap):
         self.share = 1.0
         limbs = [limb.with_limits_for([clip.poses for clip in self._placed_clips]) for limb in limbs]
         params = packed_lifted(self._placed_clips, self.sites, self.margin, limbs)
-        super().__init__(params, clips, names, limbs)
+        super().__init__(params, clips, limbs)
+        self.names = names
 
     def fresh_memory(self) -> Array:
         """As in `ClipMap`, and a footing."""

@@ -62,7 +62,7 @@ def _lead_curve(part: Led, retime: _Retiming) -> dict[str, Trajectory]:
     return {"": s_curve()}
 
 
-def _circle(part: Cylindrical | Composite | RiverClips | MapFile, retime: _Retiming) -> dict[str, Trajectory]:
+def _circle(part: Cylindrical | Composite | RiverClips, retime: _Retiming) -> dict[str, Trajectory]:
     return {"": retime(circle_of(part))}
 
 
@@ -73,12 +73,10 @@ def _tilted_circle(part: RobotArm, retime: _Retiming) -> dict[str, Trajectory]:
 
 
 def _curves_of_file(part: MapFile, retime: _Retiming) -> dict[str, Trajectory]:
-    from experiments.files.map_files import Lifted, load_map
+    from experiments.files.map_files import load_map
     from experiments.setups.modes.lifted_runs import curve_number, lifted_curve
 
     found = load_map(Path(part.file))
-    if not isinstance(found, Lifted):
-        return _circle(part, retime)
     first = found.names[curve_number(found, part.curve)]
     names = [first, *(name for name in found.names if name != first)]
     return {"" if name == first else f"_{name}": retime(lifted_curve(found, name)) for name in names}

@@ -114,17 +114,19 @@ class _WithoutClips:
 
 @part
 class MapFile(_WithoutClips):
-    """A map from a file, with clips of its own, such as one that was lifted.
+    """A lifted map from a file, with clips and curves of its own.
 
     Parameters
     ----------
     file : str
         The file (.npz).
     curve : str
-        Curve of a lifted map, on which the run begins, and which a single one follows: a clip's name or number; by
-        default the first. It is timed by the clip.
-    around, reach, expressive
-        As in `Cylindrical`, for a map that has no curves of its own.
+        Curve on which the run begins, and which a single one follows: a clip's name or number; by default the first.
+        It is timed by the clip.
+    around : Circle
+        The default: the map has curves of its own.
+    reach, expressive
+        As in `Cylindrical`.
     """
 
     kind: Literal["file"] = "file"

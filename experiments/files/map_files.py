@@ -1,4 +1,4 @@
-"""Haptic maps in files: a NumPy archive of what a map was made of, from which it is rebuilt to the last bit."""
+"""Lifted maps in files: a NumPy archive of what a map was made of, from which it is rebuilt to the last bit."""
 
 import hashlib
 import zipfile
@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from controllers.errors import ControllerError
-from controllers.haptic_map.composite import Composite
-from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from geometry.arrays import Array
 from geometry.whole_files import atomic_file
@@ -18,35 +16,34 @@ from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
 from sim.errors import SimError
 
-VERSION = 1
-_KINDS = {"Cylindrical": Cylindrical.from_arrays, "Composite": Composite.from_arrays, "Lifted": Lifted.from_arrays}
+VERSION, KIND = 1, "Lifted"
 
 
-def save_map(haptic_map: Cylindrical | Composite | Lifted, path: Path) -> None:
+def save_map(haptic_map: Lifted, path: Path) -> None:
     """Write a map; an existing file is replaced.
 
     Parameters
     ----------
-    haptic_map : Cylindrical, Composite or Lifted
+    haptic_map : Lifted
         Map to write.
     path : Path
         ``.npz`` file.
     """
-    write_arrays(path, type(haptic_map).__name__, haptic_map.arrays())
+    write_arrays(path, haptic_map.arrays())
 
 
-def write_arrays(path: Path, kind: str, arrays: Mapping[str, Array]) -> None:
-    """Write a map's arrays by key with its class name `kind`; an existing file is replaced, once all are written."""
+def write_arrays(path: Path, arrays: Mapping[str, Array]) -> None:
+    """Write a map's arrays by key; an existing file is replaced, once all are written."""
     with atomic_file(path) as file:
         # Arrays are stored under numbers, as a key need not be a valid file name.
         numbered = {str(i): value for i, value in enumerate(arrays.values())}
         np.savez(
-            file, allow_pickle=False, version=np.array(VERSION), kind=np.array(kind), keys=np.array(list(arrays)),
+            file, allow_pickle=False, version=np.array(VERSION), kind=np.array(KIND), keys=np.array(list(arrays)),
             **numbered,
         )  # fmt: skip
 
 
-def load_map(path: Path) -> Cylindrical | Composite | Lifted:
+def load_map(path: Path) -> Lifted:
     """Read a map that `save_map` wrote.
 
     Raises
@@ -64,15 +61,15 @@ def load_map(path: Path) -> Cylindrical | Composite | Lifted:
         raise SimError(f"{path}: is not a map file, or damaged; expected what hvf lift writes") from None
     if version != VERSION:
         raise SimError(f"{path}: is of version {version} of the format, this program reads {VERSION}; make it again")
-    if kind not in _KINDS:
-        raise SimError(f"{path}: holds a {kind}; expected a map: one of {', '.join(_KINDS)}")
+    if kind != KIND:
+        raise SimError(f"{path}: holds a map of kind {kind!r}; expected what hvf lift writes")
     try:
-        return _KINDS[kind](arrays)
+        return Lifted.from_arrays(arrays)
     except ControllerError as error:
         raise SimError(f"{path}: {error}") from None
 
 
-def load_figure_map(path: Path) -> tuple[Cylindrical | Composite | Lifted, tuple[Clip, ...]]:
+def load_figure_map(path: Path) -> tuple[Lifted, tuple[Clip, ...]]:
     """Read a map of the figure, and the clips of which it was made.
 
     Raises

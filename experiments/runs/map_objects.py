@@ -32,7 +32,6 @@ from experiments.setups.parts.part_types import ClipMapParts
 from experiments.setups.setups import for_size_of
 from models.humanoid.skeleton import N_POSE
 from models.mocap.motion.clip import Clip
-from sim.errors import SimError
 from sim.world.world import World
 
 
@@ -176,10 +175,7 @@ class Lifted:
 
     @cached_property
     def _map_and_clips(self) -> tuple[LiftedMap, tuple[Clip, ...]]:
-        haptic_map, clips = load_figure_map(Path(self.file))
-        if not isinstance(haptic_map, LiftedMap):
-            raise SimError(f"{self.file}: its map is {type(haptic_map).__name__}; expected one that hvf.lift wrote")
-        return haptic_map, clips
+        return load_figure_map(Path(self.file))
 
     def parts(self, world: World, field: Law, pushed: bool) -> ClipMapParts:
         """What the map gives a run in a field, with a hand that pushes or not."""

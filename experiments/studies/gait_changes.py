@@ -105,8 +105,6 @@ def _cell(result: Followed) -> str:
 def main(file: str, first: str, second: str) -> None:
     """Print the tables of changes in both directions, and of hands held between."""
     haptic_map, _ = load_figure_map(Path(file))
-    if not isinstance(haptic_map, Lifted):
-        raise SimError(f"{file}: is no lifted map; expected a file that hvf lift wrote")
     one, other = curve_number(haptic_map, first), curve_number(haptic_map, second)
     if not (haptic_map.closed[one] and haptic_map.closed[other]):
         raise SimError(f"{first} and {second}: one of them is open; expected two curves that close, as gaits have")

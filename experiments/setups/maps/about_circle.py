@@ -8,7 +8,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.motion.strides import fit_to_lap
-from experiments.config.maps import Composite, Cylindrical, MapFile, RiverClips
+from experiments.config.maps import Composite, Cylindrical, RiverClips
 from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendable, off_pace, same, timing_clip
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
@@ -49,7 +49,7 @@ class Place(NamedTuple):
         return self.radius - self.reach, self.radius + self.reach
 
 
-def place_of(part: Cylindrical | Composite | RiverClips | MapFile) -> Place:
+def place_of(part: Cylindrical | Composite | RiverClips) -> Place:
     """The place of a configured map; raises `SimError` if the Phantom does not reach its curve."""
     return Place(check_reach(circle_of(part)), part.around.radius, part.reach, part.expressive)
 

@@ -8,7 +8,7 @@ import numpy as np
 from controllers.blending.clip_arrays import clip_arrays
 from controllers.haptic_map.composite import Composite as CompositeMap
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
-from controllers.haptic_map.cylindrical import correction_shape
+from controllers.haptic_map.cylindrical import LegsOfOneClip, correction_shape
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
@@ -38,9 +38,8 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
     radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
 
     def with_legs_of(owner: int) -> CylindricalMap:
-        made = CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, arms(legs), owner)
-        made.called = tuple(clips[i % len(clips)].name for i in range(CORNERS))
-        return made
+        name = clips[owner % len(clips)].name
+        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, LegsOfOneClip(owner, arms(legs), name))
 
     def choose_legs() -> tuple[CylindricalMap, tuple[str, ...]]:
         return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)
@@ -71,7 +70,7 @@ def _cached_map(
         return CylindricalMap(clips, radii, heights, legs, None, lap).corrections
 
     # The corrections do not depend on the radii and heights between which the clips blend.
-    made_of = (*clip_arrays(clips, [str(i) for i in range(len(clips))], legs).values(), np.array([lap]))
+    made_of = (*clip_arrays(clips, range(len(clips)), legs).values(), np.array([lap]))
     shape = (-1, *correction_shape(len(legs)))
     corrections = cached_array(CylindricalMap.__module__, "corrections", made_of, shape, find)
     return CylindricalMap(clips, radii, heights, legs, corrections, lap)

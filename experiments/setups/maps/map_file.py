@@ -1,4 +1,4 @@
-"""Set-up of maps from files, lifted ones among them."""
+"""Set-up of lifted maps, which come from files."""
 
 from dataclasses import replace
 from functools import partial
@@ -15,7 +15,6 @@ from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.blendable import not_blendable
 from experiments.fitting.leg_choice import followed_map
 from experiments.fitting.similarity import arms
-from experiments.setups.maps.about_circle import about_circle, place_of
 from experiments.setups.modes.fixed_curve import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,
@@ -34,28 +33,23 @@ LIFTED_CARRY = 0.3  # factor on the default hand's distances on a lifted map, wh
 
 
 def map_file_setup(config: RunConfig, part: MapFile, clips: tuple[Clip, ...], figure: mujoco.MjModel) -> ClipMapParts:
-    """Map parts of a map that a file holds.
+    """Map parts of the lifted map in a file.
 
     Raises
     ------
     ControllerError, ModelError, SimError
-        If the file cannot be read, or a lap, a radius or a curve is given to a map that has none.
+        If the file cannot be read, or has no such curve, or a lap or a radius is given.
     """
     path = Path(part.file)
     haptic_map, clips = load_figure_map(path)
-    if isinstance(haptic_map, Lifted):
-        if part.around not in (Circle(), Circle(lap=DEFAULT_LAP)):
-            raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
-        parts = lifted_parts(haptic_map, clips, part)
-        pushed = config.user.does == "push" and config.figure.kind == "physical"
-        if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
-            parts = replace(parts, refined=partial(carried_over, haptic_map, best_transition(haptic_map, part.curve)))
-        elif pushed and not isinstance(config.mode, Rivers):
-            parts = fitted_to_pushes(haptic_map, parts, part.curve, flows_parallel(config))
-    elif part.curve:
-        raise ParameterError("only a lifted map has curves by name; leave out --curve, or name a lifted map")
-    else:
-        parts = about_circle(place_of(part), haptic_map, clips)
+    if part.around not in (Circle(), Circle(lap=DEFAULT_LAP)):
+        raise ParameterError("a lifted map has curves of its own, timed by its clips; leave out --lap and --radius")
+    parts = lifted_parts(haptic_map, clips, part)
+    pushed = config.user.does == "push" and config.figure.kind == "physical"
+    if pushed and isinstance(config.mode, Rivers) and not config.user.pushes:
+        parts = replace(parts, refined=partial(carried_over, haptic_map, best_transition(haptic_map, part.curve)))
+    elif pushed and not isinstance(config.mode, Rivers):
+        parts = fitted_to_pushes(haptic_map, parts, part.curve, flows_parallel(config))
     remark = f"the clips are those of the map: {', '.join(haptic_map.names)}"
     return replace(parts.with_remarks((remark,)), static={"map_sha256": map_digest(path)})
 

@@ -111,7 +111,7 @@ def test_interrupted_archive_leaves_no_file(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(whole.os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        write_arrays(tmp_path / "map.npz", "Lifted", {"a": np.zeros(3)})
+        write_arrays(tmp_path / "map.npz", {"a": np.zeros(3)})
     assert not list(tmp_path.iterdir())
 
 

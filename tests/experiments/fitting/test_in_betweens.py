@@ -51,7 +51,7 @@ def laps(h_map, r, z, rows=ROWS, count=1.0):
 
 @pytest.mark.parametrize("clips", SIMILAR)
 def test_similar_clips_are_blended_including_legs(clips):
-    assert map_of(clips).upper == ()
+    assert map_of(clips).legs is None
 
 
 @pytest.mark.parametrize("clips", [FIGURE_CLIPS, *slow_params((STANDING, *STEPPING, *SIMILAR, *SLOWER))])
@@ -82,7 +82,7 @@ def test_feet_in_stance_keep_their_places_while_the_mixture_changes(clips):
 
 def test_feet_of_one_clip_at_all_corners_are_left_to_the_clip():
     h_map = map_of(("cheer", "cheer", "cheer", "cheer"))
-    assert h_map.upper == ()
+    assert h_map.legs is None
     np.testing.assert_array_equal(changing_mixture(h_map, True), changing_mixture(h_map, False))
 
 

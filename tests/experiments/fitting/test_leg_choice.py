@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from controllers.haptic_map.cylindrical import Cylindrical
+from controllers.haptic_map.cylindrical import Cylindrical, LegsOfOneClip
 from experiments.fitting import hand_tours, leg_choice
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.hand_tours import tour_of_domain
@@ -25,7 +25,7 @@ NEVER = np.inf
 @pytest.fixture(scope="module")
 def maps() -> list[Cylindrical]:
     motions = [(clip.poses, clip.fps) for clip in map(embedded, NAMES)]
-    return [Cylindrical(motions, R, Z, LEGS, None, LAP, arms(LEGS), owner) for owner in range(4)]
+    return [Cylindrical(motions, R, Z, LEGS, None, LAP, LegsOfOneClip(owner, arms(LEGS))) for owner in range(4)]
 
 
 def set_verdicts(

@@ -40,7 +40,6 @@ def _with_transition_at(haptic_map: Lifted, angle: float) -> Lifted:
 
 def test_distance_between_places_is_measured_and_large_ones_are_reported(wandering_map_file: Path) -> None:
     haptic_map, _ = load_figure_map(wandering_map_file)
-    assert isinstance(haptic_map, Lifted)
     angles = np.arange(0.0, 2.0 * np.pi, 0.2)
     distances = np.array([places_apart(haptic_map, MapTransition(0, 1, angle, 0.1, 0.1)) for angle in angles])
     assert distances.min() < 0.15
@@ -57,7 +56,6 @@ def test_pushing_hand_is_warned_of_distant_transition_places(
     wandering_map_file: Path, tmp_path: Path, user: str, figure: str, warnings: int
 ) -> None:
     haptic_map, _ = load_figure_map(wandering_map_file)
-    assert isinstance(haptic_map, Lifted)
     angles = np.arange(0.0, 2.0 * np.pi, 0.2)
     far = max(angles, key=lambda angle: places_apart(haptic_map, MapTransition(0, 1, angle, 0.1, 0.1)))
     save_map(_with_transition_at(haptic_map, float(far)), tmp_path / "map.npz")
