@@ -71,7 +71,7 @@ def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.C
     file = tmp_path / "mine.json"
     file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")
     stderr = refused(["run", "--config", str(file), "--out", str(tmp_path / "out")], capsys)
-    assert "takes 1 to 4 clips, got 0" in stderr
+    assert "got 0 --clips; expected 1 to 4 for the cylindrical map" in stderr
 
 
 @pytest.mark.parametrize("command", [["lift", "walk", "--out"], ["prepare", "missing.bvh"]])

@@ -127,7 +127,7 @@ def cases_of(law: FunctionLaw) -> Cases:
         given = pending.pop()
         if len(found) == MAX_CASES:
             raise ControllerError(
-                f"{law.place} has more than {MAX_CASES} cases; a certificate follows the comparisons of so many"
+                f"{law.place} has more than {MAX_CASES} cases; expected fewer comparisons, as all are certified"
             )
         path = ExecutionPath(given)
         wrench = _wrench_on_path(law, path, symbols)

@@ -84,7 +84,7 @@ def check_clips(clips: Sequence[Clip], most: int, name: str) -> None:
         If so; the message names the map and how many clips it takes.
     """
     if not 1 <= len(clips) <= most:
-        raise ParameterError(f"the {name} map takes 1 to {most} clips, got {len(clips)}; expected so many --clips")
+        raise ParameterError(f"got {len(clips)} --clips; expected 1 to {most} for the {name} map")
 
 
 def motions_of(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:

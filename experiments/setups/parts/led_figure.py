@@ -63,7 +63,7 @@ def led_parts(config: RunConfig, clips: tuple[Clip, ...], figure: mujoco.MjModel
         If there is not one clip, or it does not travel on foot.
     """
     if len(clips) != 1:
-        raise ParameterError(f"one clip is led, got {len(clips)}; expected --clips of one, such as walk or run")
+        raise ParameterError(f"got {len(clips)} --clips; expected one to lead, such as walk or run")
     haptic_map, gait = led_map(clips[0], figure, is_authored(config))
     return LedParts(
         haptic_map=haptic_map, clips=clips, curve=s_curve(), gait=gait,

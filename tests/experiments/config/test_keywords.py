@@ -172,14 +172,14 @@ def test_messages_use_keywords_in_python_and_options_on_the_command_line(
             {"figure": "none", "smoothing": 6.0},
             '^smoothing=6.0 has no meaning with figure="none"; it belongs',
         ),
-        ({"mode": "lead", "clips": ["walk", "run"]}, "expected clips of one, such as walk or run$"),
+        ({"mode": "lead", "clips": ["walk", "run"]}, "^got 2 clips; expected one to lead, such as walk or run$"),
         ({"stiffness": -1.0}, "^stiffness is -1; expected 0 N/m or more"),
     ):
         with pytest.raises(hvf.ParameterError, match=message):
             hvf.run(**keyword_arguments)
     with pytest.raises(hvf.ParameterError, match=r"^--foo is not known; there are "):
         run_config(foo=3)
-    with pytest.raises(hvf.ParameterError, match=r"got 0; expected so many clips$"):
+    with pytest.raises(hvf.ParameterError, match=r"^got 0 clips; expected 1 to 4 for the cylindrical map$"):
         hvf.Cylindrical([], around=CURVE)
 
 

@@ -250,7 +250,7 @@ def test_led_hand_feels_what_the_motors_give_not_what_the_field_asks_for() -> No
         ({"map": "composite"}, "leave out --map"),
         ({"user": "push"}, "--user push"),
         ({"walls": True}, "--walls has no meaning with --mode lead"),
-        ({"clips": ("walk", "run")}, "one clip is led, got 2"),
+        ({"clips": ("walk", "run")}, "got 2 --clips; expected one to lead"),
         ({"clips": ("cheer",)}, "must go somewhere"),
         ({"floor_scale": -1.0}, "floor_scale is -1; expected 0.001 or more, and finite"),
         ({"leash": -1.0}, "leash is -1; expected 0 N/m or more, and finite"),
