@@ -12,6 +12,9 @@ from geometry.arrays import Array, rms
 from models.errors import ModelError
 from models.humanoid.skeleton import N_POSE, N_TANGENT, Pose
 
+MOTION_BANDWIDTH = 8.0
+"""Frequency [Hz] up to which motion is kept where noise is taken from it: with 6 and 15 Hz the residuals of eight
+prepared captures are the same to 2 percentage points."""
 CLOSURE_TOLERANCE = 1e-3
 """Largest gap between the ends of a clip that is repeated [rad], [m]: files are written with few digits."""
 

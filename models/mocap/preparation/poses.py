@@ -5,10 +5,8 @@ from scipy.interpolate import CubicSpline
 
 from geometry import quaternions
 from geometry.arrays import Array
-from models.mocap.motion.clip import Clip
+from models.mocap.motion.clip import MOTION_BANDWIDTH, Clip
 
-# Cut-off of the low-pass [Hz]; with 6 and 15 Hz the residuals of eight captures are the same to 2 percentage points.
-_CUTOFF_FREQUENCY = 8.0
 # −3 dB point of a second-order Butterworth filter that is run forwards and backwards, over its cut-off: (√2 − 1)^¼
 # (Winter).
 _TWO_PASS_RATIO = 0.802
@@ -33,12 +31,12 @@ def resampled(clip: Clip, fps: float) -> Clip:
 
 
 def smoothed(clip: Clip) -> Clip:
-    """The motion low-passed at 8 Hz without phase lag; a closed clip is extended periodically."""
-    if clip.n_frames < 8 or 0.4 * clip.fps <= _CUTOFF_FREQUENCY:
+    """The motion low-passed at `MOTION_BANDWIDTH` without phase lag; a closed clip is extended periodically."""
+    if clip.n_frames < 8 or 0.4 * clip.fps <= MOTION_BANDWIDTH:
         return clip
     from scipy.signal import butter, sosfiltfilt  # imported late: it loads scipy.stats, which is slow
 
-    sections = np.asarray(butter(2, _CUTOFF_FREQUENCY / (clip.fps / 2.0) / _TWO_PASS_RATIO, output="sos"))
+    sections = np.asarray(butter(2, MOTION_BANDWIDTH / (clip.fps / 2.0) / _TWO_PASS_RATIO, output="sos"))
     pad = min(round(clip.fps), clip.n_frames - 2)
     if clip.closes():
         poses, first = extend_periodically(clip, pad)

@@ -15,7 +15,7 @@ ends by its point reflection. Where more than a bound is taken away, from joints
 highest quarter of the frequencies of the joints has nearly as much power as the second one, as noise has and limbs do
 not, there is noise. It would hide which feet stand, whose speeds are differences of frames. So it is removed from
 both, each with its own cut-off, that for γ = 1.4, which does not undersmooth where noise is correlated (Kim & Gu
-2004), and at most 8 Hz, as preparation does with every motion.
+2004), and at most `MOTION_BANDWIDTH`, as preparation does with every motion.
 """
 
 from collections.abc import Sequence
@@ -27,13 +27,13 @@ from scipy.fft import dct, idct
 
 from geometry import quaternions
 from geometry.arrays import Array
+from models.mocap.motion.clip import MOTION_BANDWIDTH
 from models.mocap.readers.source_motion import SourceMotion
 from models.mocap.retargeting.broken_frames import root_positions, thigh_length, used_joints
 from models.mocap.retargeting.skeleton_roles import Roles
 
 _MIN_FRAME_RATE = 23.0  # [1/s]; below it limbs move at all frequencies
 _MIN_FRAMES = 24  # of a piece
-_CUTOFF_FREQUENCY = 8.0  # [Hz] as of `models.mocap.preparation.poses`
 _CUTOFFS = 48  # that are compared, between `_LOWEST` and nearly the highest frequency of the file
 _LOWEST = 1.5  # [Hz]
 _CAREFUL = 1.4  # γ of the cut-off with which noise is removed
@@ -97,7 +97,7 @@ def _estimated(values: Array, fps: float) -> _Estimate:
     """Noise of components (n, m), medians over those that move."""
     moving = values[:, values.std(axis=0) > 10.0 * _NEGLIGIBLE]
     if not moving.shape[1]:
-        return _Estimate(0.0, False, _CUTOFF_FREQUENCY)
+        return _Estimate(0.0, False, MOTION_BANDWIDTH)
     power = np.asarray(dct(_continued(moving, fps)[0], axis=0, norm="ortho")) ** 2
     cutoffs = np.geomspace(_LOWEST, 0.49 * fps, _CUTOFFS)
     responses = np.array([_response(len(power), cutoff, fps) for cutoff in cutoffs])
@@ -113,7 +113,7 @@ def _estimated(values: Array, fps: float) -> _Estimate:
     return _Estimate(
         float(np.median(np.sqrt(removed[best(1.0)]))),
         flatness >= _MIN_FLATNESS,
-        min(float(cutoffs[best(_CAREFUL)]), _CUTOFF_FREQUENCY),
+        min(float(cutoffs[best(_CAREFUL)]), MOTION_BANDWIDTH),
     )
 
 
