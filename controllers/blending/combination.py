@@ -15,7 +15,8 @@ from numba import njit
 
 from controllers.borrowed import without_refcount
 from controllers.legs.floor import keep_above
-from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
+from controllers.legs.limb_kinematics import solve_limb
+from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb
 from controllers.legs.stance_hold import advance_hand, carry_root, hold_stance_foot
 from controllers.motion.inbetween import FOOT, ROOT
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, LAST_ANGLE, MEMORY, drift_motion, update_lap

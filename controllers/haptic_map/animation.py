@@ -28,7 +28,7 @@ class ClipMap(KernelMap):
     clips : sequence of (Array, float)
         Clips that the map is made of: poses (n, nq) and frames per second.
     limbs : sequence of Limb
-        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limb_kinematics`).
     """
 
     def __init__(self, params: Array, clips: Sequence[tuple[Array, float]], limbs: Sequence[Limb]) -> None:
@@ -110,7 +110,7 @@ class AnimationMap(ClipMap):
     second_group : sequence of int
         Joints, counted from 1, that are blended with the second group of weights.
     limbs : sequence of Limb
-        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limb_kinematics`).
     lap : float, optional
         Duration of the hand's lap [s], in which each clip is played as often as it fits (`strides`); by default once.
     apart : bool

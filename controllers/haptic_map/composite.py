@@ -47,7 +47,7 @@ class Composite(AnimationMap):
     r_range : tuple of two floats
         Interval [m] over which red turns to blue; r_min > 0.
     limbs : sequence of Limb
-        Limbs of the lower body that stand (see `limbs`).
+        Limbs of the lower body that stand (see `limb_kinematics`).
     lap : float, optional
         As in `Cylindrical`.
     apart : bool

@@ -136,7 +136,7 @@ class Cylindrical(AnimationMap):
     r_range, z_range : tuple of two floats
         Intervals [m] over which the clips blend; r_min > 0.
     limbs : sequence of Limb
-        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limb_kinematics`).
     corrections : Array, shape (n, k, 2 + 4 limbs), optional
         `corrections` of a map of the same clips, limbs and lap, to spare computing them again.
     lap : float, optional

@@ -23,7 +23,8 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.base import KernelMap
 from controllers.legs.grounded import grounded, max_swing_speed_ratio, stepping
 from controllers.legs.limb_ends import with_ends
-from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb, solve_limb
+from controllers.legs.limb_kinematics import solve_limb
+from controllers.legs.limbs import LAST, LIMB_SIZE, N_END_CHANNELS, Limb
 from controllers.motion.channels import closing_signs
 from controllers.motion.loops import checked_clip, forward_loop, rotate_in_plane, turn_of
 from controllers.walking.walked_path import (

@@ -56,7 +56,7 @@ class Lifted(ClipMap):
     sites : Array, shape (rows, m, 2)
         (r_i, z_i) [m] at `rows` equal steps of a lap.
     limbs : sequence of Limb
-        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limbs`).
+        Limbs whose ends (feet) are placed at the mean of their positions in the clips (see `limb_kinematics`).
     names : sequence of str, optional
         Names of the clips; by default their numbers.
     margin : float

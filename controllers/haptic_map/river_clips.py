@@ -106,7 +106,7 @@ class RiverClips(AnimationMap):
     tube : float
         Distance from a curve [m] within which a branch is followed; beyond it the nearest point of all counts.
     limbs : sequence of Limb
-        Limbs whose ends (feet) are placed (see `limbs`).
+        Limbs whose ends (feet) are placed (see `limb_kinematics`).
     lap : float, optional
         Duration of a round [s], in which each clip is played as often as it fits (`strides`); by default once.
     apart : bool

@@ -15,7 +15,8 @@ import numpy as np
 from numba import njit
 
 from controllers.legs.footsteps import FLOOR, lever, sole_height
-from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB_SIZE, MIDDLE, OFFSETS, SHANK, THIGH, solve_limb
+from controllers.legs.limb_kinematics import solve_limb
+from controllers.legs.limbs import AXIS, CENTRE, LAST, LIMB_SIZE, MIDDLE, OFFSETS, SHANK, THIGH
 from controllers.state import Pose
 from controllers.work_array import work_array
 from geometry.arrays import Array

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.limbs import Limb, flexion, solve_limb
+from controllers.legs.limb_kinematics import flexion, solve_limb
+from controllers.legs.limbs import Limb
 from tests.controllers.clips_for_maps import LEG, difference, numeric_jacobian, stylus, swinging
 
 R, Z = (0.03, 0.07), (-0.03, 0.03)
