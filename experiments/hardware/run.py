@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from rich.console import Console
 
@@ -15,7 +16,14 @@ from experiments.config.part import to_dict, to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
 from experiments.console.output import say
-from experiments.files.device_files import calibration_from, content_of, linkage_from, read_device_file, save_device
+from experiments.files.device_files import (
+    Calibration,
+    calibration_from,
+    content_of,
+    linkage_from,
+    read_device_file,
+    save_device,
+)
 from experiments.files.json_text import json_text
 from experiments.hardware.arming_checks import check_device, check_limits, check_meaning, ignored_options, verified
 from experiments.hardware.operator_terminal import attend
@@ -38,6 +46,7 @@ from sim.hardware.recorder_process import RecordingJob
 from sim.hardware.servo_process import ServoClock
 from sim.hardware.shared import SharedNumbers
 from sim.recording.recording import Recording
+from sim.world.linkage import Linkage
 
 _NEW_RECORDING = f"{results.RECORDING}.new"  # name of the recording until the device is accepted
 
@@ -72,29 +81,24 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         console.print(f"Ignored on a device: {', '.join(ignored)}.", highlight=False)
     given, config = config, resolved(config)
     _check_permit(config, options, console)
-    content = content_of(config.device)
-    known = linkage_from(content)
-    emulated_linkage = linkage_from(read_device_file(options.emulate)) if options.emulate else known
-    scene = SceneConfig(servo_period=config.clock.servo_period, physics_step=config.clock.physics_step)
-    calibrated = options.emulate is None or not any(emulated_linkage.offset)
-    if options.name == EMULATED:
-        delay_in_steps(scene, emulated_linkage.delay)
-        check_device(emulated_identity("MuJoCo", calibrated), calibration_from(content))
+    content, clock = content_of(config.device), config.clock
+    known, calibration = linkage_from(content), calibration_from(content)
+    scene = SceneConfig(servo_period=clock.servo_period, physics_step=clock.physics_step)
+    emulation = _emulation(options, known, calibration, scene) if options.name == EMULATED else None
     session = _compile_session(given, options, console)  # which remarks on what was left open
     job = RecordingJob(options.out / _NEW_RECORDING, to_dict(config), session.static(), config.seed, scene, known)
     gate = Gate(
-        config.clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
+        clock.servo_period, force=options.force, speed=options.speed, speed_margin=0.5 * options.speed,
         small=options.small, ramp=options.ramp, dead_man=options.dead_man, permitted=True,
     )  # fmt: skip
-    offset, calibration = known.offset, calibration_from(content)
-    make = MakeServo(served(config), options.name, gate, offset, calibration, silent=options.silence)
+    make = MakeServo(served(config), options.name, gate, known.offset, calibration, silent=options.silence)
     with run_folder(options) as begin, contextlib.ExitStack() as stack:
-        if options.name == EMULATED:
-            make_device = MakeEmulated(scene, start_of(session), emulated_linkage)
+        if emulation is not None:
+            make_device = MakeEmulated(scene, start_of(session), emulation.linkage)
             packets = stack.enter_context(emulated(make_device, options.realtime))
-            make = replace(make, packets=packets, calibrated=calibrated)
-        clock = ServoClock(late=options.late, realtime=options.realtime)
-        run = stack.enter_context(HardwareRun(make, config.clock.servo_period, clock, job))
+            make = replace(make, packets=packets, calibrated=emulation.calibrated)
+        pace = ServoClock(late=options.late, realtime=options.realtime)
+        run = stack.enter_context(HardwareRun(make, clock.servo_period, pace, job))
         ready = run.start()
         warnings = check_device(ready.identity, make.calibration, "inertia" in content)
         begin()
@@ -112,6 +116,28 @@ def run_hardware(config: RunConfig, options: RunHardware) -> int:
         summary = _write_results(outcome, session.remarks, options.out, console)
     say(summary, options.json)  # once all is written, for nobody may read it to the end
     return 0 if outcome.sound else 1
+
+
+class _Emulation(NamedTuple):
+    """Linkage of the emulated device, and whether its encoders have a zero."""
+
+    linkage: Linkage
+    calibrated: bool
+
+
+def _emulation(options: RunHardware, known: Linkage, calibration: Calibration | None, scene: SceneConfig) -> _Emulation:
+    """The device to emulate: that of `--emulate`, or else the one that the device file describes (`known`).
+
+    Raises
+    ------
+    SimError
+        If it cannot be emulated, or may not be armed with this calibration.
+    """
+    linkage = linkage_from(read_device_file(options.emulate)) if options.emulate else known
+    calibrated = options.emulate is None or not any(linkage.offset)
+    delay_in_steps(scene, linkage.delay)
+    check_device(emulated_identity("MuJoCo", calibrated), calibration)
+    return _Emulation(linkage, calibrated)
 
 
 def _compile_session(config: RunConfig, options: RunHardware, console: Console) -> Session:
