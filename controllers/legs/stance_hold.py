@@ -63,8 +63,11 @@ _MAX_OFFSET, _MAX_TURN = 0.3, 0.8
 _CONTACT_SCALE = 1e-3  # [m] scale of heights in the weights of the touching points
 _REVERSAL_ANGLE = 0.15  # [rad] backward motion after which the hand's direction counts as reversed
 _MAX_ANGLE_STEP = 1.0  # [rad] larger than any change of the hand's angle in one tick
+# A footing, the memory: the direction in which the hand goes round (±1), how far it has gone back since [rad], its last
+# angle [rad]; then of each end its offset (x, y [m], ψ [rad]), and of the last step the position of its centre over the
+# ground (2) [m], its orientation (4, zeros before the first step), σ, σ₀ and m.
 _DIRECTION, _BACKTRACK, _ANGLE, _ENDS = range(4)
-_OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _MIXING, _END_SIZE = 0, 3, 5, 9, 10, 11, 12  # of each end
+_OFFSET, _POSITION, _TURN, _HOLD, _STANCE, _MIXING, _END_SIZE = 0, 3, 5, 9, 10, 11, 12
 
 
 def fresh_footing(limbs: int) -> Array:
@@ -88,9 +91,9 @@ def packed_soles(limbs: Sequence[Limb]) -> Array:
 
 
 @njit
-def _step_down(x: float, low: float, high: float) -> float:
-    """C² step from 1 at `low` to 0 at `high`."""
-    return smooth_step((high - x) / (high - low))
+def _degree_of_stance(height: float) -> float:
+    """σ₀ of a sole at a height over the ground [m]: a C² step from 1 at `STANCE_HEIGHT` to 0 at `_RELEASE_HEIGHT`."""
+    return smooth_step((_RELEASE_HEIGHT - height) / (_RELEASE_HEIGHT - STANCE_HEIGHT))
 
 
 @njit
@@ -162,6 +165,39 @@ def _yaw(angle: float, q: Array) -> Quaternion:
 
 
 @njit
+def _slip_of_turn(levers: Array, low: float, before: Array, low_before: float, back: float) -> tuple[float, float]:
+    """Displacement (x, y) of a sole's touching points relative to its centre [m], as the sole turned from `before`.
+
+    Parameters
+    ----------
+    levers, before : Array, shape (k, 3)
+        Points relative to the centre now, and at the last step [m].
+    low, low_before : float
+        Heights of the lowest of them [m]: the higher a point is above it, the less it touches.
+    back : float
+        Heading by which the sole is turned back now [rad].
+    """
+    turned_c, turned_s = np.cos(back), np.sin(back)
+    total, moved_x, moved_y = 0.0, 0.0, 0.0
+    for i in range(levers.shape[0]):
+        touch = np.exp((low - levers[i, 2]) / _CONTACT_SCALE) + np.exp((low_before - before[i, 2]) / _CONTACT_SCALE)
+        moved_x += touch * (turned_c * levers[i, 0] - turned_s * levers[i, 1] - before[i, 0])
+        moved_y += touch * (turned_s * levers[i, 0] + turned_c * levers[i, 1] - before[i, 1])
+        total += touch
+    return moved_x / total, moved_y / total
+
+
+@njit
+def _limit_offset(state: Array) -> None:
+    """Shorten the offset of an end to `_MAX_OFFSET`, and its heading to `_MAX_TURN`."""
+    distance = np.sqrt(state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2)
+    if distance > _MAX_OFFSET:
+        state[_OFFSET] *= _MAX_OFFSET / distance
+        state[_OFFSET + 1] *= _MAX_OFFSET / distance
+    state[_OFFSET + 2] = min(max(state[_OFFSET + 2], -_MAX_TURN), _MAX_TURN)
+
+
+@njit
 def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its memory
     footing: Array, limb: int, ahead: float, mixture: float, sole: Array, ground: float, frame: Array, end: Array,
     q: Quat,
@@ -195,7 +231,7 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
     turn = _yaw(frame[2] + state[_OFFSET + 2], q)
     low = _turn_sole(sole, turn, levers)
     x, y = end[0] + state[_OFFSET], end[1] + state[_OFFSET + 1]
-    stance = _step_down(end[2] + low - ground, STANCE_HEIGHT, _RELEASE_HEIGHT)
+    stance = _degree_of_stance(end[2] + low - ground)
     size = (state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2) / _MAX_OFFSET**2 + (state[_OFFSET + 2] / _MAX_TURN) ** 2
     lifted = 1.0 - 0.5 * (stance + state[_STANCE])
     mixing = state[_MIXING] * np.exp(-(_FADE_RATE * lifted + _ALONE_FADE_RATE * (1.0 - mixture)) * ahead)
@@ -209,15 +245,9 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
         low_before = _turn_sole(sole, last, before)
         w, _, _, z = multiply(turn[0], turn[1], turn[2], turn[3], last[0], -last[1], -last[2], -last[3])
         back = -2.0 * share * (np.arctan2(z, w) if w >= 0.0 else np.arctan2(-z, -w))
-        turned_c, turned_s = np.cos(back), np.sin(back)
-        total, moved_x, moved_y = 0.0, 0.0, 0.0
-        for i in range(points):
-            touch = np.exp((low - levers[i, 2]) / _CONTACT_SCALE) + np.exp((low_before - before[i, 2]) / _CONTACT_SCALE)
-            moved_x += touch * (turned_c * levers[i, 0] - turned_s * levers[i, 1] - before[i, 0])
-            moved_y += touch * (turned_s * levers[i, 0] + turned_c * levers[i, 1] - before[i, 1])
-            total += touch
-        moved_x = moved_x / total + frame[0] + cosine * x - sine * y - state[_POSITION]
-        moved_y = moved_y / total + frame[1] + sine * x + cosine * y - state[_POSITION + 1]
+        slip_x, slip_y = _slip_of_turn(levers, low, before, low_before, back)
+        moved_x = slip_x + frame[0] + cosine * x - sine * y - state[_POSITION]
+        moved_y = slip_y + frame[1] + sine * x + cosine * y - state[_POSITION + 1]
         state[_OFFSET] -= share * (cosine * moved_x + sine * moved_y)
         state[_OFFSET + 1] -= share * (cosine * moved_y - sine * moved_x)
         state[_OFFSET + 2] += back
@@ -226,11 +256,7 @@ def hold_stance_foot(  # noqa: PLR0913 - a kernel: a foot, its frame and its mem
             state[_OFFSET + i] *= left
     elif known:
         state[_OFFSET : _OFFSET + 3] = 0.0
-    distance = np.sqrt(state[_OFFSET] ** 2 + state[_OFFSET + 1] ** 2)
-    if distance > _MAX_OFFSET:
-        state[_OFFSET] *= _MAX_OFFSET / distance
-        state[_OFFSET + 1] *= _MAX_OFFSET / distance
-    state[_OFFSET + 2] = min(max(state[_OFFSET + 2], -_MAX_TURN), _MAX_TURN)
+    _limit_offset(state)
     end[0] += state[_OFFSET]
     end[1] += state[_OFFSET + 1]
     q[0], q[1], q[2], q[3] = _yaw(state[_OFFSET + 2], q)
