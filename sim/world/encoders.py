@@ -20,7 +20,7 @@ from controllers.state import (
 )
 from geometry.arrays import Array
 from geometry.rotations import multiply
-from geometry.vectors import Triple
+from geometry.vectors import Triple, dot
 from models.phantom.dynamics import gravity_torques, mass_matrix
 from models.phantom.kinematics import (
     ENCODER_STEP,
@@ -110,19 +110,9 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
             memory[ANGLES + i] = theta[i]
         for i in range(4):
             hand[HAND_QUATERNION + i] = orientation[i]
-    for i in range(3):
-        memory[RATES + i] = keep * memory[RATES + i] + (1.0 - keep) * (theta[i] - memory[ANGLES + i]) / period
-        memory[ANGLES + i] = theta[i]
-    rate = (memory[RATES], memory[RATES + 1], memory[RATES + 2])
-    j = jacobian(theta)
+    rates, j = _update_joint_rates(memory, theta, keep, period), jacobian(theta)
     p_H = vector_to_hand_frame(forward_kinematics(theta))
-    v_H = vector_to_hand_frame(
-        (
-            j[0][0] * rate[0] + j[0][1] * rate[1] + j[0][2] * rate[2],
-            j[1][0] * rate[0] + j[1][1] * rate[1] + j[1][2] * rate[2],
-            j[2][0] * rate[0] + j[2][1] * rate[1] + j[2][2] * rate[2],
-        )
-    )
+    v_H = vector_to_hand_frame((dot(j[0], rates), dot(j[1], rates), dot(j[2], rates)))
     _update_angular_velocity(hand, orientation, keep, period)
     hand[HAND_TIME] = t
     for i in range(3):
@@ -131,6 +121,15 @@ def take_reading(  # noqa: PLR0913 - a kernel takes angles and memory one by one
     for i in range(4):
         hand[HAND_QUATERNION + i] = orientation[i]
     hand[HAND_SWITCH] = switch
+
+
+@njit
+def _update_joint_rates(memory: Array, theta: Triple, keep: float, period: float) -> Triple:
+    """Low-pass the backward differences of the joint angles, and store the angles; returns the rates [rad/s]."""
+    for i in range(3):
+        memory[RATES + i] = keep * memory[RATES + i] + (1.0 - keep) * (theta[i] - memory[ANGLES + i]) / period
+        memory[ANGLES + i] = theta[i]
+    return memory[RATES], memory[RATES + 1], memory[RATES + 2]
 
 
 @njit
