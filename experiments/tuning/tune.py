@@ -140,16 +140,14 @@ def tune(
     check_callable("cost", cost, "a run")
     search, users = search or Search(), tuple(panel) or (sim.user,)
     check_trials("tuning", search.candidates * len(users), f"{search.candidates} candidates, {len(users)} users")
-    _check_space(space)
-    for edge in range(2):
-        with_values(sim, {path: bounds[edge] for path, bounds in space.items()})
+    _check_space(sim, space)
     # A session in the middle of the space compiles the units before any run.
     with_values(sim, {path: 0.5 * (low + high) for path, (low, high) in space.items()}).session(seconds)
     study = _create_study(search, _study_name(sim, space, cost, users, seconds, search))
-    complete = (optuna.trial.TrialState.COMPLETE,)
+    complete, pruned = optuna.trial.TrialState.COMPLETE, optuna.trial.TrialState.PRUNED
     ranges = {path: optuna.distributions.FloatDistribution(low, high) for path, (low, high) in space.items()}
     for number in range(len(study.trials), MAX_PROPOSALS_RATIO * search.candidates):
-        if len(study.get_trials(states=complete)) >= search.candidates:
+        if len(study.get_trials(states=(complete,))) >= search.candidates:
             break
         study.sampler = sampler_of(search.sampler, search.seed, number)
         trial = study.ask(ranges)
@@ -160,9 +158,9 @@ def tune(
         if allowed:
             study.tell(trial, _mean_costs(candidate, users, cost, seconds, search, trial.params))
         else:
-            study.tell(trial, state=optuna.trial.TrialState.PRUNED)
-    tried = [trial.values for trial in study.get_trials(states=complete)]
-    refused = len(study.get_trials(states=(optuna.trial.TrialState.PRUNED,)))
+            study.tell(trial, state=pruned)
+    tried = [trial.values for trial in study.get_trials(states=(complete,))]
+    refused = len(study.get_trials(states=(pruned,)))
     if not tried:
         raise ParameterError(f"none of {refused} candidates is certified; expected a space with some, or allow_unknown")
     front = tuple((dict(t.params), tuple(t.values)) for t in study.best_trials)
@@ -170,8 +168,8 @@ def tune(
     return TunedSimulation(with_values(sim, values), values, costs, front, len(tried), refused)
 
 
-def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
-    """Refuse a space without parameters, and an invalid range."""
+def _check_space(sim: Simulation, space: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse a space without parameters, an invalid range, and a bound that a parameter cannot have."""
     check_kind("space", space, Mapping)
     if not space:
         raise ParameterError('the space is empty; expected a range for a parameter or more: {"field.k_r": (50, 2000)}')
@@ -180,6 +178,8 @@ def _check_space(space: Mapping[str, tuple[float, float]]) -> None:
         check_kind(path, bounds, Sequence[float])
         if len(bounds) != 2 or not -np.inf < bounds[0] < bounds[1] < np.inf:
             raise ParameterError(f"{path} is {bounds!r}; expected the lowest and the highest value, both finite")
+    for edge in range(2):
+        with_values(sim, {path: bounds[edge] for path, bounds in space.items()})
 
 
 def _study_name(
