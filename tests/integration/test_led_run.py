@@ -12,10 +12,9 @@ from experiments.runs.run import run
 from experiments.setups.modes import lead
 from experiments.setups.parts import leading_hand
 from sim.recording.recording import Recording
+from tests.captures import MOCAP, needs_mocap
 
 pytestmark = pytest.mark.slow
-
-MOCAP = Path(__file__).parents[3] / "shared" / "mocap"
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +79,7 @@ def test_soles_keep_contact_and_support_bounds_the_turn_rate(folder: Path) -> No
 
 # What is prepared rounds by the kernels of OpenBLAS: xia has 0.138 with Zen's and 0.142 with Nehalem's; with these
 # 02_01 has 0.043, 02_03 0.089 and snu's run 0.086.
+@needs_mocap
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize(
     ("file", "residual"),
@@ -93,18 +93,15 @@ def test_soles_keep_contact_and_support_bounds_the_turn_rate(folder: Path) -> No
     ],
 )
 def test_captured_walks_and_runs_stand_and_return(tmp_path: Path, file: str, residual: float) -> None:
-    if not MOCAP.is_dir():
-        pytest.skip("the motion capture data is not beside the project")
     run(run_config(mode="lead", clips=(str(MOCAP / file),), seconds=19.0), tmp_path / "run", False, 0.0)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert_led_back(summary)
     assert summary["figure"]["residual_force_rms"] < residual
 
 
+@needs_mocap
 @pytest.mark.usefixtures("without_page")
 def test_stepping_run_returns_along_a_wider_s_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if not MOCAP.is_dir():
-        pytest.skip("the motion capture data is not beside the project")
     # Each half turns from −72° to 72°: the figure lags, and at 1.3 times its pace it stumbled and turned by 7°.
     for module in (lead, leading_hand):
         monkeypatch.setattr(module, "HALF_TURN", 0.4 * np.pi)

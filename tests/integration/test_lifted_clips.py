@@ -20,11 +20,11 @@ from models.mocap.readers.own_bvh import write_bvh
 from models.world.scene import SceneConfig
 from sim.reference.reference import map_poses
 from sim.world.world import World
+from tests.captures import MOCAP, needs_mocap
 
 TURN = 2.0 * np.pi
 LEGS = figure_legs(World(SceneConfig()).body)
 EMBEDDED = [embedded(name) for name in embedded_names()]
-MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
 
 
 def lifted(clips):
@@ -94,7 +94,7 @@ def recorded():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not MOCAP.is_dir(), reason="no shared motion capture beside the project")
+@needs_mocap
 def test_captured_clips_alone_and_together_are_exact_at_every_frame():
     clips = recorded()
     assert len(clips) >= 10

@@ -11,11 +11,11 @@ from experiments.config.options import run_config
 from experiments.files.map_files import load_figure_map
 from experiments.runs.run import run
 from sim.recording.recording import Recording
+from tests.captures import MOCAP, needs_mocap
 
 pytestmark = pytest.mark.slow
 
 CLIPS = ("walk", "run", "jump", "backflip")
-MOCAP = Path(__file__).resolve().parents[2].parent / "shared" / "mocap"
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def test_push_at_the_transition_switches_between_walk_and_run(
     assert speed == pytest.approx(3.0 if second == "run" else 1.25, rel=0.03)
 
 
-@pytest.mark.skipif(not MOCAP.is_dir(), reason="no shared motion capture beside the project")
+@needs_mocap
 @pytest.mark.usefixtures("without_page")
 def test_push_takes_the_figure_from_a_captured_walk_to_a_captured_run_and_back(tmp_path: Path) -> None:
     files = [str(MOCAP / "deepmimic" / f"humanoid3d_{gait}.txt") for gait in ("walk", "run")]

@@ -16,6 +16,7 @@ from models.mocap.library import load
 from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording
 from sim.viewer.live_stage import LiveStage
+from tests.captures import MOCAP, needs_mocap
 from tests.devices.test_spacemouse import Cap
 from tests.live.browser import PATIENCE, ServedPage, choose, chromium, drag, new_tab, on_screen, save_screenshot
 
@@ -23,7 +24,7 @@ __all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 TOKEN = "0123456789abcdef"
-CAPTURE = Path(__file__).parents[3] / "shared" / "mocap" / "xia" / "strutting_01_000.bvh"  # prepared in seconds
+CAPTURE = MOCAP / "xia" / "strutting_01_000.bvh"  # prepared in seconds
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +222,7 @@ def test_upload_beyond_the_size_limit_is_answered_in_the_page(tab: Any, served: 
     assert not (served.desk.folder / "uploads" / "large.bvh").exists()
 
 
-@pytest.mark.skipif(not CAPTURE.exists(), reason="needs the captures beside this repository")
+@needs_mocap
 def test_capture_is_uploaded_prepared_and_driven(tab: Any, served: ServedPage) -> None:
     served.desk.pause(True)  # without a graphics card, drawing competes with preparation
     upload(tab, CAPTURE)

@@ -12,6 +12,7 @@ from experiments.live.session.desk import MAX_UPLOAD_BYTES, Desk
 from models.mocap.library import embedded, load
 from models.mocap.readers.own_bvh import write_bvh
 from sim.errors import SimError
+from tests.captures import MOCAP, needs_mocap
 
 PATIENCE = 300.0  # [s] for what takes a second or two on a machine that does nothing else
 
@@ -164,13 +165,10 @@ def test_failed_build_is_reported_and_the_run_continues(desk: LoggingDesk) -> No
     desk.until(lambda: time_of(desk) > before, "time goes on")
 
 
-CAPTURES = Path(__file__).resolve().parents[3] / "shared" / "mocap" / "cmu_amc"
-
-
-@pytest.mark.skipif(not (CAPTURES / "02.asf").exists(), reason="needs the captures beside this repository")
+@needs_mocap
 def test_asf_and_amc_upload_is_prepared_and_driven(desk: LoggingDesk) -> None:
     for name in ("02.asf", "02_03.amc"):
-        desk.upload(name, (CAPTURES / name).read_bytes())
+        desk.upload(name, (MOCAP / "cmu_amc" / name).read_bytes())
     desk.until(lambda: desk.preparing is None, "it is prepared", patience=4.0 * PATIENCE)
     assert "02_03" in desk.clips, desk.messages[-1]
     builds = desk.builds

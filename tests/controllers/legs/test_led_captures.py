@@ -1,7 +1,5 @@
 """Led motion captures: their feet keep their contacts on any path, and runs step instead of flying."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,11 +13,11 @@ from experiments.setups.parts.led_figure import MAX_STEP, led_clips, led_map
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
+from tests.captures import MOCAP, needs_mocap
 from tests.controllers.clips_for_maps import difference
 from tests.controllers.figure_soles import slide, soles
 from tests.derivatives import central_differences
 
-MOCAP = Path(__file__).parents[4] / "shared" / "mocap"
 CAPTURES = (
     "cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "cmu_amc/16_09.amc", "deepmimic/humanoid3d_walk.txt",
     "deepmimic/humanoid3d_run.txt", "snu/walk.bvh", "snu/run.bvh", "xia/strutting_01_000.bvh", "xia/angry_13_000.bvh",
@@ -79,11 +77,10 @@ def test_closed_clip_is_unchanged(figure, name: str) -> None:
         np.testing.assert_array_equal(led.pose(walker(s)), plain.pose(walker(s)))
 
 
+@needs_mocap
 @pytest.mark.slow
 @pytest.mark.parametrize("file", CAPTURES)
 def test_soles_of_captured_gaits_keep_their_contacts(figure, file: str) -> None:
-    if not MOCAP.is_dir():
-        pytest.skip("the motion capture data is not beside the project")
     (clip,), _ = led_clips(LedMap(clips=(str(MOCAP / file),)))
     led, gait = led_map(clip, figure, authored=False)
     path = bent_path(gait, 0.35, gait.reach + 2.0 * led.stride + 1.0)

@@ -1,7 +1,5 @@
 """Flights of whole clips: embedded, captured, played too fast, and flown by the physical figure."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -13,9 +11,7 @@ from models.mocap.dynamics.momentum import momentum
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip
 from models.mocap.retargeting import retarget
-
-SHARED = Path(__file__).resolve().parents[3] / ".." / "shared" / "mocap"
-shared = pytest.mark.skipif(not SHARED.is_dir(), reason="motion capture is not at ../shared/mocap")
+from tests.captures import MOCAP, needs_mocap
 
 FLIGHTS = {"cmu_amc/01_01.amc": 10, "deepmimic/humanoid3d_cartwheel.txt": 0}  # a handstand is no flight
 
@@ -61,7 +57,7 @@ def test_certificate_inputs_depend_on_clip_and_tolerance():
     assert len(hashes) == 3
 
 
-@shared
+@needs_mocap
 @pytest.mark.parametrize(
     ("file", "expected"),
     [
@@ -74,16 +70,16 @@ def test_certificate_inputs_depend_on_clip_and_tolerance():
     ],
 )  # fmt: skip
 def test_captured_clips_get_expected_ballistic_verdicts(file, expected):
-    found = clip_ballistics(load_clip(SHARED / file))
+    found = clip_ballistics(load_clip(MOCAP / file))
     assert found.certificate.verdicts["ballistic"].verdict == expected
     if file in FLIGHTS:
         assert len(found.flights) == FLIGHTS[file]
 
 
-@shared
+@needs_mocap
 def test_run_on_sloping_floor_is_unknown_without_levelling(monkeypatch):
     monkeypatch.setattr(retarget, "levelled", lambda root, segments, fps: (root, segments, 0.0))
-    sloping = verdict(load_clip(SHARED / "cmu_amc/02_03.amc"))
+    sloping = verdict(load_clip(MOCAP / "cmu_amc/02_03.amc"))
     assert sloping.verdict == "unknown"
     assert "from where it stands, beyond" in sloping.reason
 
@@ -122,11 +118,11 @@ def test_physical_figure_flies_as_predicted_at_each_rate(name):
         assert trial.residual == 0.0
 
 
-@shared
+@needs_mocap
 @pytest.mark.slow
 @pytest.mark.parametrize("file", ["deepmimic/humanoid3d_spinkick.txt", "cmu_amc/02_04.amc", "cmu_amc/16_09.amc"])
 def test_captured_flights_are_flown_within_predicted_rates(file):
-    found = clip_ballistics(load_clip(SHARED / file))
+    found = clip_ballistics(load_clip(MOCAP / file))
     flight = found.flights[0]
     for rate, expected in (
         (1.0, True), (1.02 * flight.done[0], True), (0.98 * flight.done[1], True),

@@ -1,7 +1,5 @@
 """Repair of clips whose flights are not ballistic: timing, angular momentum, clearance over the floor."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from models.errors import ModelError
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip
+from tests.captures import MOCAP, needs_mocap
 
 UP = np.eye(75)[2]
 
@@ -48,12 +47,6 @@ def test_lift_is_smooth_and_leaves_valid_clips_unchanged():
     assert np.abs(np.diff(lifted.poses[:, 2] - sunk[:, 2], 2)).max() * clip.fps**2 < 15.0
 
 
-SHARED = Path(__file__).resolve().parents[3] / ".." / "shared" / "mocap"
-
-
-shared = pytest.mark.skipif(not SHARED.is_dir(), reason="motion capture is not at ../shared/mocap")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("pace", [0.75, 1.6])
 def test_jump_at_wrong_pace_is_repaired(pace):
@@ -76,10 +69,10 @@ def test_valid_flight_is_left_unchanged():
 
 
 @pytest.mark.slow
-@shared
+@needs_mocap
 def test_infeasible_backflip_falls_with_g_after_repair(tmp_path):
     target = tmp_path / "mended.bvh"
-    repair_file(SHARED / "snu" / "backflip.bvh", target)
+    repair_file(MOCAP / "snu" / "backflip.bvh", target)
     after = clip_ballistics(load_clip(target))
     assert max(flight.fit.gravity for flight in after.flights) == pytest.approx(9.81, abs=0.1)
     assert {flight.verdict for flight in after.flights} == {"certified"}
@@ -89,15 +82,15 @@ def test_infeasible_backflip_falls_with_g_after_repair(tmp_path):
     assert judged.verdict == "unknown"
     assert "from where it stands" in judged.reason
     with pytest.raises(ModelError, match="exists"):
-        repair_file(SHARED / "snu" / "backflip.bvh", target)
+        repair_file(MOCAP / "snu" / "backflip.bvh", target)
     with pytest.raises(ModelError, match="BVH"):
-        repair_file(SHARED / "snu" / "backflip.bvh", tmp_path / "mended.amc")
+        repair_file(MOCAP / "snu" / "backflip.bvh", tmp_path / "mended.amc")
 
 
-@shared
+@needs_mocap
 @pytest.mark.slow
 def test_repaired_clip_is_flown_by_the_physical_figure():
-    repaired = repair_clip(load_clip(SHARED / "snu" / "backflip.bvh"))
+    repaired = repair_clip(load_clip(MOCAP / "snu" / "backflip.bvh"))
     for found, expected in ((repaired.before, False), (repaired.after, True)):
         trial = fly(found.clip, found.flights[0].fit, 1.0)
         assert (trial.distance <= 0.05) == expected

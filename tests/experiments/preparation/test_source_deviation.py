@@ -1,6 +1,5 @@
 """Deviation of a motion from its file, for faithful motions and for ones altered by a known amount."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,9 +12,9 @@ from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.looping import close_or_rest
 from models.mocap.preparation.poses import resampled
+from tests.captures import MOCAP, needs_mocap
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
-MOCAP = Path(__file__).resolve().parents[3].parent / "shared" / "mocap"
 RIGS = (
     Rig(),
     Rig(up="+Z", turn=2.0, unit=1.0, proportions={"leg": 1.3, "arm": 0.7, "shoulders": 1.1}),
@@ -101,6 +100,7 @@ def test_prepared_part_is_compared_at_the_times_of_the_file(tmp_path, pace):
     assert deviations(tmp_path / "walk.bvh", late)[1].direction > np.deg2rad(3.0)
 
 
+@needs_mocap
 @pytest.mark.parametrize(
     "name",
     [
@@ -110,8 +110,6 @@ def test_prepared_part_is_compared_at_the_times_of_the_file(tmp_path, pace):
 )  # fmt: skip
 def test_captures_deviate_little_from_their_files(name):
     """Trunk, hips, shoulders, limbs and feet within 2°, joints within 3 cm; 1.8° and 2.9 cm where a floor slopes."""
-    if not MOCAP.is_dir():
-        pytest.skip("no motion capture at ../shared/mocap")
     found = deviation(*read(MOCAP / name))
     assert found.direction < np.deg2rad(2.0), found.segment
     assert found.place < 0.03, found.joint

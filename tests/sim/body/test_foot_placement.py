@@ -1,7 +1,5 @@
 """Placement of the feet of a figure whose root deviates in flight."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -12,9 +10,9 @@ from models.humanoid.skeleton import JOINTS, figure_model, rest_pose
 from models.mocap.library import embedded
 from sim.body.figure import Figure, FigureGains
 from sim.body.tracking import TrackingConfig, floor_world, track
+from tests.captures import MOCAP, needs_mocap
 
 OMEGA = FigureGains().joint_rate
-MOCAP = Path(__file__).parents[4] / "shared" / "mocap"
 
 
 def _in_flight():
@@ -121,21 +119,19 @@ def test_placement_does_not_disturb_a_somersault():
     assert placed.root_error_max < 0.01
 
 
+@needs_mocap
 @pytest.mark.slow
 def test_repeated_captured_jumps_do_not_fall():
     file = MOCAP / "deepmimic" / "humanoid3d_jump.txt"
-    if not file.is_file():
-        pytest.skip(f"needs motion capture in {MOCAP}")
     report = track(prepared_clips([file])[0].clip, 20.0)
     assert not report.falls
     assert report.stance.force_rms < 0.04  # 2.7 %
 
 
+@needs_mocap
 @pytest.mark.slow
 def test_placement_lowers_the_residual_of_repeated_jumps():
     file = MOCAP / "animated_drawings" / "jumping.bvh"
-    if not file.is_file():
-        pytest.skip(f"needs motion capture in {MOCAP}")
     clip = prepared_clips([file])[0].clip
     placed, unplaced = (
         track(clip, 20.0, TrackingConfig(gains=FigureGains(placement_reach=reach)))

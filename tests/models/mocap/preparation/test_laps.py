@@ -1,7 +1,5 @@
 """The lap of a capture that begins and ends anywhere: the part that repeats best."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,7 @@ from models.humanoid.skeleton import rest_pose
 from models.mocap.library import embedded, load_clip
 from models.mocap.motion.clip import Clip, pose_difference
 from models.mocap.preparation.laps import best_lap, foot_gaps
-
-MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
+from tests.captures import MOCAP, needs_mocap
 
 
 def test_closed_clip_is_its_own_lap() -> None:
@@ -51,6 +48,7 @@ def test_clip_without_repetition_is_returned_unchanged() -> None:
         assert best_lap(clip).clip is clip
 
 
+@needs_mocap
 @pytest.mark.parametrize(
     ("file", "seconds", "degrees"),
     [
@@ -61,8 +59,6 @@ def test_clip_without_repetition_is_returned_unchanged() -> None:
     ],
 )
 def test_captured_gaits_have_laps_of_one_cycle(file: str, seconds: float, degrees: float) -> None:
-    if not MOCAP.is_dir():
-        pytest.skip("the motion capture data is not beside the project")
     clip = load_clip(MOCAP / file)
     lap = best_lap(clip)
     assert lap.end - lap.start == pytest.approx(seconds, abs=0.03)

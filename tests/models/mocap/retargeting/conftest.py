@@ -1,14 +1,11 @@
 import re
-from functools import cache
 
 import numpy as np
 import pytest
 
 from models.errors import ModelError
-from models.humanoid.skeleton import figure_model
 from models.mocap.library import load
-from models.mocap.motion import kinematics
-from models.mocap.retargeting import abdomen, calibration, retarget
+from models.mocap.retargeting import retarget
 from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.rig_comparison import CalibratedMotion, Motions, deviation_of
 from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
@@ -29,16 +26,6 @@ def walk_rows(tmp_path):
         return load(tmp_path / "b.bvh")
 
     return table, load_rows
-
-
-@pytest.fixture(scope="module")
-def cached_figure_model():
-    """Compile the model of the figure once instead of a dozen times per file."""
-    with pytest.MonkeyPatch.context() as patched:
-        model = cache(figure_model)
-        for module in (abdomen, calibration, kinematics, retarget):
-            patched.setattr(module, "figure_model", model)
-        yield
 
 
 @pytest.fixture(scope="module")

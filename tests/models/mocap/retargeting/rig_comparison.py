@@ -6,7 +6,6 @@ with the source. They are compared before the figure is placed on the floor, whe
 as much as the proportions of the legs require. What a remark calls a guess is not compared.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +16,12 @@ from models.mocap.library import embedded, embedded_names, load
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import global_rotations
 from models.mocap.readers.formats import READABLE_SUFFIXES
+from tests.captures import MOCAP
 
 MAX_ANGLE = 2.0  # deg
 MAX_ROOT_DEVIATION = 0.01  # largest distance of the root from its path in the source [m per m of leg]
 MAX_SOLE_DEVIATION = 0.01  # largest change of height on the floor [m]
 LEG_LENGTH = 0.86  # leg length of the figure [m]
-MOCAP = Path(__file__).parents[5] / "shared" / "mocap"
 LIMBS = {"upper_arm": (0.0, 1.0, 0.0), "forearm": (0.0, 1.0, 0.0), "thigh": (0.0, 0.0, -1.0), "shank": (0.0, 0.0, -1.0)}
 
 

@@ -15,7 +15,6 @@ from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.posed_clips import posed
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
-pytestmark = pytest.mark.usefixtures("cached_figure_model")
 SWAP_TEST_CLIPS = ("walk", "ginga", "cheer", "squat_dance")
 
 

@@ -13,8 +13,6 @@ from tests.models.mocap.retargeting.posed_clips import posed
 from tests.models.mocap.retargeting.rig_comparison import MAX_ANGLE
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
-pytestmark = pytest.mark.usefixtures("cached_figure_model")
-
 
 @pytest.mark.parametrize("n_frames", [1, 60])
 def test_hanging_foot_in_a_pose_that_is_held_is_not_levelled(n_frames, motions, tmp_path):

@@ -13,8 +13,6 @@ from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.posed_clips import posed, rotated_about_the_origin
 from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
-pytestmark = pytest.mark.usefixtures("cached_figure_model")
-
 
 def test_up_axis_is_not_determined_for_a_part_of_a_somersault(motions, tmp_path):
     clip = motions.clip("backflip", 30.0)

@@ -16,8 +16,6 @@ from tests.models.mocap.retargeting.posed_clips import posed
 from tests.models.mocap.retargeting.rig_comparison import assert_same_motion
 from tests.models.mocap.retargeting.rigs import FAMILIES, ROOTS, TWISTS, UPS, ZERO_POSES, Rig, random_rig, write_rig
 
-pytestmark = pytest.mark.usefixtures("cached_figure_model")
-
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_joint_names_of_any_vendor_give_the_same_motion(family, motions, compare):
