@@ -1,10 +1,11 @@
-"""Fixtures with the reference firmware, compiled from C."""
+"""Fixtures: a clock that tests set, and the reference firmware, compiled from C."""
 
 from pathlib import Path
 
 import pytest
 
 from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compile_c
+from tests.devices.hand_made import Clock
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +21,8 @@ def firmware(firmware_library: Path) -> Firmware:
 @pytest.fixture
 def handle(firmware: Firmware) -> FirmwareHandle:
     return FirmwareHandle(firmware)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()

@@ -15,10 +15,10 @@ from sim.devices.own_device import TipDriver
 from sim.devices.spacemouse import SpaceMouse
 from sim.users.hand.arm import Arm
 from tests.devices.firmware import ROOT, Firmware, FirmwareHandle, compile_c
+from tests.devices.hand_made import Cap
 from tests.devices.mocks import DhdBackend, HdBackend, mock_dhd, mock_hd
 from tests.devices.own_tip import LinkageTip
 from tests.devices.rig import DeviceBackend, FirmwareBackend, Linkage, Rig
-from tests.devices.test_spacemouse import Cap
 
 PUSHES = {20: (0, -250, 120), 220: (0, 40, -40), 300: (0, 0, 0)}
 """Push of the hand on the cap from a tick on; 350 is full deflection."""

@@ -16,7 +16,6 @@ from sim.devices.driver import DriverFault
 from sim.devices.hdapi import ERRORS, HDAPI, HdapiDevice
 from sim.errors import SimError
 from tests.devices.mocks import mock_hd, motor_force
-from tests.devices.test_hid import Clock
 
 
 @pytest.fixture(scope="module")
@@ -28,11 +27,6 @@ def library(tmp_path_factory):
 def hd(library):
     library.mock_reset()
     return library
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 def pose(hd, p_mm, rotation=None) -> None:

@@ -12,24 +12,10 @@ from sim.devices.hid import HidPhantom
 from sim.errors import SimError
 from tests.devices.firmware import Firmware, FirmwareHandle, output_report
 from tests.devices.follow import device_follow, gated_follow, rms, simulated_follow
+from tests.devices.hand_made import Clock
 from tests.devices.rig import FirmwareBackend, Linkage, LockStep, Rig
 
 POSE = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 1.2])
-
-
-class Clock:
-    """A clock that the test sets."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 @pytest.fixture

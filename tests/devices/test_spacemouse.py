@@ -1,7 +1,5 @@
 """A SpaceMouse as a device: a push sets the velocity of the tip within the workspace."""
 
-from collections import deque
-
 import numpy as np
 import pytest
 
@@ -17,41 +15,12 @@ from models.phantom.kinematics import (
 from models.phantom.parameters import PREMIUM_1_5
 from sim.devices.driver import READ, REFUSED, DriverFault
 from sim.devices.spacemouse import MAX_ANGULAR_SPEED, MAX_SPEED, SpaceMouse
-from tests.devices.test_hid import Clock
-
-
-class Cap:
-    """A HID handle whose reports the test queues."""
-
-    def __init__(self) -> None:
-        self.queue, self.plugged = deque[bytes](), True
-
-    def push(self, x: int, y: int, z: int) -> None:
-        self.queue.append(b"\x01" + np.array([x, y, z], "<i2").tobytes())
-
-    def turn(self, x: int, y: int, z: int) -> None:
-        self.queue.append(b"\x02" + np.array([x, y, z], "<i2").tobytes())
-
-    def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
-        if not self.plugged:
-            raise OSError("read error")
-        return list(self.queue.popleft()[:max_length]) if self.queue else []
-
-    def set_nonblocking(self, value: bool) -> int:
-        return 0
-
-    def close(self) -> None:
-        self.plugged = False
+from tests.devices.hand_made import Cap, Clock
 
 
 @pytest.fixture
 def cap() -> Cap:
     return Cap()
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
 
 
 @pytest.fixture

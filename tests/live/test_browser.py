@@ -17,7 +17,7 @@ from sim.devices.spacemouse import SpaceMouse
 from sim.recording.recording import Recording
 from sim.viewer.live_stage import LiveStage
 from tests.captures import MOCAP, needs_mocap
-from tests.devices.test_spacemouse import Cap
+from tests.devices.hand_made import Cap
 from tests.live.browser import PATIENCE, ServedPage, choose, chromium, drag, new_tab, on_screen, save_screenshot
 
 __all__ = ["chromium"]  # a fixture

@@ -6,8 +6,7 @@ import pytest
 from experiments.live import cap_hand
 from experiments.live.cap_hand import RELEASE_DELAY, CapHand
 from sim.devices.spacemouse import MAX_SPEED, SpaceMouse
-from tests.devices.test_hid import Clock
-from tests.devices.test_spacemouse import Cap
+from tests.devices.hand_made import Cap, Clock
 
 STYLUS = np.array([0.03, -0.01, 0.02])
 
