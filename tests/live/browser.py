@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from experiments.config.run_config import RunConfig
 from experiments.live.page import Page
@@ -30,18 +29,6 @@ PATIENCE = 240.0  # [s] for what takes a second on a machine that does nothing e
 WIDTH, HEIGHT = 900, 520
 SCREENSHOT_FOLDER = os.environ.get("HVF_SCREENSHOTS", "")
 """Folder for screenshots; none are saved if it is empty."""
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    """The browser; skips if there is none."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="needs Playwright for Python")
-    if CHROMIUM is None:
-        pytest.skip("needs Debian's chromium")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 def new_tab(browser: Any, address: str, width: int = WIDTH, height: int = HEIGHT) -> Any:

@@ -18,9 +18,8 @@ from sim.recording.recording import Recording
 from sim.viewer.live_stage import LiveStage
 from tests.captures import MOCAP, needs_mocap
 from tests.devices.hand_made import Cap
-from tests.live.browser import PATIENCE, ServedPage, choose, chromium, drag, new_tab, on_screen, save_screenshot
+from tests.live.browser import PATIENCE, ServedPage, choose, drag, new_tab, on_screen, save_screenshot
 
-__all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 TOKEN = "0123456789abcdef"

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 from experiments.cli import main
-from tests.live.browser import PATIENCE, chromium, save_screenshot
+from tests.live.browser import PATIENCE, save_screenshot
 
-__all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 

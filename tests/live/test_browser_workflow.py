@@ -19,7 +19,6 @@ from sim.viewer.live_stage import GHOST_AT
 from tests.live.browser import (
     ServedPage,
     choose,
-    chromium,
     control_beside,
     drag,
     fill,
@@ -28,7 +27,6 @@ from tests.live.browser import (
     save_screenshot,
 )
 
-__all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 

@@ -6,9 +6,7 @@ from typing import Any
 import pytest
 
 from experiments.files.html_page import html_page
-from tests.live.browser import chromium
 
-__all__ = ["chromium"]  # a fixture
 pytestmark = pytest.mark.processes
 
 CELL = "<td>a cell that does not break</td>"
