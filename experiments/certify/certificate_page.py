@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.stability import River, boundary
+from controllers.certificates.loop.stability import CertifiedRiver, boundary
 from controllers.certificates.report import Certificate, Verdict
 from experiments.files.html_page import html_page
 from experiments.flights.ballistics import ClipBallistics
@@ -119,7 +119,7 @@ _MAX_SHOWN_SIZE = 12  # largest array that the page shows
 _RATE_RANGE = (0.25, 4.0)  # range of the figure of admissible rates
 
 
-def stability_figure(river: River, verdict: Verdict) -> Figure:
+def stability_figure(river: CertifiedRiver, verdict: Verdict) -> Figure:
     """Stability boundary of the gains with the river's own gains, and the critical stiffness along the curve."""
     damping = np.geomspace(0.1 * max(river.b_d, 0.1), 100.0, 28)
     critical = boundary(river, damping)

@@ -9,7 +9,7 @@ from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.leading_law import Regime, walking
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import CertifiedRiver, stability
 from controllers.certificates.report import FROM_WORST, Verdict
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.leading import Leading
@@ -62,10 +62,12 @@ def leading_regimes(field: Leading) -> dict[str, list[Regime]]:
     }
 
 
-def leading_river(field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling) -> River:
+def leading_river(
+    field: Leading, regime: Regime, curve: Trajectory, device: Device, sampling: Sampling
+) -> CertifiedRiver:
     """LEADING in one regime, in the form that certificates take."""
     law = regime.law(field.walking.scale, field.k_z / max(field.k_l, 1e-3))
-    return River(law, field.k_l, field.b, float("inf"), curve, device, sampling)
+    return CertifiedRiver(law, field.k_l, field.b, float("inf"), curve, device, sampling)
 
 
 def certify_leading(

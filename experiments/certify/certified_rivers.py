@@ -12,7 +12,7 @@ from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import HandImpedance, HandRange
 from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import CertifiedRiver, stability
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common, common_lyapunov
 from controllers.certificates.switching.switching import HandRetention, SelectionRule, competing_river, switching
@@ -45,12 +45,14 @@ class Meeting(NamedTuple):
     phase: float
 
 
-def certified_bundle(bundle: RiverBundle, device: Device, sampling: Sampling) -> tuple[River, ...]:
+def certified_bundle(bundle: RiverBundle, device: Device, sampling: Sampling) -> tuple[CertifiedRiver, ...]:
     """The rivers of a bundle, in the form that certificates take."""
-    return tuple(River(FOLLOW_LAW, r.drag / r.tau, r.drag, r.epsilon, r.curve, device, sampling) for r in bundle.rivers)
+    return tuple(
+        CertifiedRiver(FOLLOW_LAW, r.drag / r.tau, r.drag, r.epsilon, r.curve, device, sampling) for r in bundle.rivers
+    )
 
 
-def meetings(rivers: Sequence[River]) -> list[Meeting]:
+def meetings(rivers: Sequence[CertifiedRiver]) -> list[Meeting]:
     """Meetings of all ordered pairs of rivers with overlapping tubes, at the phase where their curves are nearest."""
     found: list[Meeting] = []
     for i, j in permutations(range(len(rivers)), 2):
@@ -60,7 +62,7 @@ def meetings(rivers: Sequence[River]) -> list[Meeting]:
     return found
 
 
-def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, crossing: str) -> Common | None:
+def held_common(rivers: Sequence[CertifiedRiver], place: Meeting, hands: HandRange, crossing: str) -> Common | None:
     """Common Lyapunov function where two rivers meet, for a hand in the middle of a range that stays there.
 
     It is common to the loops with either river, with none and, if rivers are summed, with both. So the state decays
@@ -84,7 +86,12 @@ def held_common(rivers: Sequence[River], place: Meeting, hands: HandRange, cross
 
 
 def certify_rivers(
-    config: RunConfig, mode: Rivers, main: River, hands: HandRange, push: float, curves: Mapping[str, Trajectory]
+    config: RunConfig,
+    mode: Rivers,
+    main: CertifiedRiver,
+    hands: HandRange,
+    push: float,
+    curves: Mapping[str, Trajectory],
 ) -> dict[str, Verdict]:
     """Verdicts on the stability of the rivers of a run besides the first, and on switching between all of them.
 
@@ -92,7 +99,7 @@ def certify_rivers(
     ----------
     config, mode : RunConfig, Rivers
         Configuration of the run, and its mode.
-    main : River
+    main : CertifiedRiver
         The river on which the run begins.
     hands : HandRange
         As in `stability`.
@@ -125,7 +132,7 @@ def certify_rivers(
 
 
 def _find_counterexample(
-    field: HigherOrder, rivers: Sequence[River], places: Sequence[Meeting], push: float
+    field: HigherOrder, rivers: Sequence[CertifiedRiver], places: Sequence[Meeting], push: float
 ) -> dict[str, object]:
     """First counterexample to switching at any meeting, without a push first; empty if torques are delayed."""
     if rivers[0].sampling.delay > 0.0:

@@ -13,7 +13,7 @@ from controllers.certificates.loop.governed import governed_stability
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.laws import LAWS, FollowForce, follow_law
 from controllers.certificates.loop.passivity import passivity
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.region.region import region
 from controllers.certificates.report import Certificate, CertificateError, Verdict, hash_of, hashes_of, without_laws
 from controllers.errors import ParameterError
@@ -53,7 +53,7 @@ _MOMENT_ASSUMPTION = "the moment on the stylus (--orientation-*) has no effect: 
 PLOT, REGION_PLOT, FLIGHTS_PLOT = "stability.png", "region.png", "flights.png"
 
 
-def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
+def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, CertifiedRiver]:
     """The laws of a run in the form that is certified, with a delay of the torques [s]; named as in `certified_laws`.
 
     A bunny is assumed to run at the clock's pace.
@@ -66,7 +66,7 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     course, sampling = certified_curves(config)[""], certified_sampling(config, delay)
     device = phantom_device(linkage_of(config.device))
     return {
-        name: River(
+        name: CertifiedRiver(
             follow_law(1.0 - compensation(given_curves(config)[""], course)) if law == "parallel" else LAWS[law],
             stiffness, damping, width, course, device, sampling,
         )
@@ -74,7 +74,9 @@ def certified_rivers(config: RunConfig, delay: float = 0.0) -> dict[str, River]:
     }  # fmt: skip
 
 
-def certify(rivers: Mapping[str, River], hands: HandRange, push: float, drag: float = 0.0) -> dict[str, Verdict]:
+def certify(
+    rivers: Mapping[str, CertifiedRiver], hands: HandRange, push: float, drag: float = 0.0
+) -> dict[str, Verdict]:
     """Verdicts on stability and region of attraction for a range of hands, and on passivity; for FOLLOW also on energy.
 
     `push` [N] is the hand's force for the energy bound; `drag` [N s/m] is that of a governor in addition to the laws.
@@ -203,7 +205,7 @@ def _write_certificate(certificate: Certificate, plots: Mapping[str, tuple[Figur
 
 def _field_verdicts(
     config: RunConfig, delay: float, hands: HandRange, push: float, clips: Sequence[Clip]
-) -> tuple[River, dict[str, Verdict]]:
+) -> tuple[CertifiedRiver, dict[str, Verdict]]:
     """The law that the stability figure shows, and all verdicts on the field."""
     if isinstance(config.mode, Lead):
         if not clips:

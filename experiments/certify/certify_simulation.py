@@ -14,7 +14,7 @@ from controllers.certificates.loop.law_cases import Cases, certified_cases, exec
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, follow_law
 from controllers.certificates.loop.passivity import passivity
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.loop.symbolic_execution import NotExecutable
 from controllers.certificates.report import Verdict, hash_of, without_laws
 from controllers.certificates.switching.common_lyapunov import common_lyapunov, contraction
@@ -140,7 +140,7 @@ def _check_executed(
         return verdict
     reach = getattr(sim.haptic_map, "reach", DEFAULT_REACH)
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
-    place = River(FOLLOW_LAW, 1.0, 0.0, float("inf"), curve, phantom_device(linkage_of(sim.device)), sampling)
+    place = CertifiedRiver(FOLLOW_LAW, 1.0, 0.0, float("inf"), curve, phantom_device(linkage_of(sim.device)), sampling)
     try:
         return check_executed(sim.field.program(), place, reach, verdict, hands)
     except NotExecutable:
@@ -148,7 +148,7 @@ def _check_executed(
         return Verdict("unknown", f"{verdict.reason}; {reason}" if verdict.verdict == "unknown" else reason)
 
 
-def _certified_river(sim: Simulation, law: Follow | Bunny, delay: float) -> River:
+def _certified_river(sim: Simulation, law: Follow | Bunny, delay: float) -> CertifiedRiver:
     """The law that leads along a curve, in the form that is certified."""
     if isinstance(law, Follow):
         base, k_r, b_d, width = follow_law(law.parallel_share), law.k_r, law.b_d, law.epsilon
@@ -158,7 +158,7 @@ def _certified_river(sim: Simulation, law: Follow | Bunny, delay: float) -> Rive
             # Near a bunny that pulls along the curve, the field equals FOLLOW to first order.
             base, width = FOLLOW_LAW, float("inf")
     sampling = Sampling(sim.clock.servo_period, delay, phantom_of(sim.device).cutoff)
-    return River(base, k_r, b_d, width, law.curve, phantom_device(linkage_of(sim.device)), sampling)
+    return CertifiedRiver(base, k_r, b_d, width, law.curve, phantom_device(linkage_of(sim.device)), sampling)
 
 
 def _split_sum(field: Law) -> list[_ScaledPart]:
@@ -225,7 +225,7 @@ def _add_assumptions(verdict: Verdict, assumed: tuple[str, ...]) -> Verdict:
     return replace(verdict, assumptions=verdict.assumptions + assumed)
 
 
-def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[HandImpedance]) -> Verdict:
+def switched_stability(rivers: Sequence[CertifiedRiver], drag: float, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on a field that switches arbitrarily between rivers, with a governor of a drag [N s/m].
 
     Certified if every river is certified and, at every phase and with every hand, they have a common quadratic Lyapunov
@@ -253,7 +253,7 @@ def switched_stability(rivers: Sequence[River], drag: float, hands: Sequence[Han
 
 
 def _first_without_common(
-    rivers: Sequence[River], drag: float, hands: Sequence[HandImpedance]
+    rivers: Sequence[CertifiedRiver], drag: float, hands: Sequence[HandImpedance]
 ) -> tuple[float, HandImpedance] | None:
     """The first phase and hand with which no common Lyapunov function of the rivers was found; None if all have one."""
     governed = [

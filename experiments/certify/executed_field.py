@@ -8,7 +8,7 @@ import numpy as np
 from controllers.certificates.loop.executed import WorstState, examine_curve, examine_random_states
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.hand_samples import state_text
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.law import Program
 from controllers.safety.limiter import ForceLimiter
@@ -22,14 +22,16 @@ MAX_OFFSET_FRACTION = 0.2  # fraction of the map's reach: distance off the curve
 MAX_SPEED_RATIO = 2.0  # speed of a hand that pushes forwards at the edge of the map, relative to the curve's
 
 
-def walled(config: RunConfig, main: River, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]) -> Verdict:
+def walled(
+    config: RunConfig, main: CertifiedRiver, verdict: Verdict, hands: HandRange, clips: Sequence[Clip]
+) -> Verdict:
     """A verdict that omits walls, complemented by a check of the executed program (`check_executed`)."""
     parts = parts_of(config, map_parts(config, World(config.scene, config.body).body, tuple(clips) or None))
     reach = float(getattr(parts.maps, "reach", DEFAULT_REACH))
     return check_executed(parts.program, main._replace(curve=parts.course), reach, verdict, hands)
 
 
-def check_executed(program: Program, main: River, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
+def check_executed(program: Program, main: CertifiedRiver, reach: float, verdict: Verdict, hands: HandRange) -> Verdict:
     """A verdict after a check of the program: refuted if it is unstable in a state about the curve of `main`."""
     examined = [
         examine_curve(program, main, MAX_OFFSET_FRACTION * reach, hands.hands()),
@@ -60,6 +62,6 @@ def check_executed(program: Program, main: River, reach: float, verdict: Verdict
     return replace(verdict, reason=f"{verdict.reason}; {summary}", figures=figures)
 
 
-def _place(main: River, found: WorstState) -> str:
+def _place(main: CertifiedRiver, found: WorstState) -> str:
     off, speed = 1e3 * np.linalg.norm(found.p - main.curve.point(found.phase)), np.linalg.norm(found.v)
     return f"{off:.2g} mm off the curve at phase {found.phase:.3g} s with {speed:.3g} m/s"

@@ -11,7 +11,7 @@ import tyro
 
 from controllers.certificates.loop.hand import HandImpedance, HandRange
 from controllers.certificates.loop.laws import FOLLOW_LAW
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import CertifiedRiver, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
@@ -30,7 +30,7 @@ ASSUMED_CONDITIONS = Conditions(16)
 class Certified(NamedTuple):
     """A certified river whose curve stands still, the intervals of its hands, and its largest spectral radius."""
 
-    river: River
+    river: CertifiedRiver
     still: Trajectory
     hands: HandRange
     radius: float
@@ -61,7 +61,7 @@ def draw_certified(rng: np.random.Generator) -> Certified:
         hands = HandRange(*(_interval_about(number, rng) for number in (hand.mass, hand.damping, hand.stiffness)))
         lap = LAP_SECONDS / LAP_DURATION * np.asarray(trial.curve.times)
         curve = Trajectory(lap, trial.curve.positions, periodic=True)
-        river = River(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
+        river = CertifiedRiver(FOLLOW_LAW, k_r, trial.b_d, float("inf"), curve, phantom_device(), trial.sampling)
         try:
             verdict = stability(river, hands.hands())
         except SimError:  # the curve leaves the workspace between the points that were checked: draw another one

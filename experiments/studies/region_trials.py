@@ -13,7 +13,7 @@ import tyro
 
 from controllers.certificates.loop.device import kinematics_function, plant_function
 from controllers.certificates.loop.hand import HandImpedance, HandRange
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.region.region import region
 from controllers.certificates.report import Verdict
 from controllers.curves.closest_point import closest_phases
@@ -34,13 +34,15 @@ class Outcome(NamedTuple):
     last: float
 
 
-def certified_region() -> tuple[River, Verdict]:
+def certified_region() -> tuple[CertifiedRiver, Verdict]:
     """The river of the default run and the verdict on its region, for `HANDS`."""
     river = certified_rivers(RunConfig())[""]
     return river, region(river, HANDS, ForceLimiter(river.sampling.period).peak, Verdict("certified", "not asked"))
 
 
-def simulate_from(river: River, figures: Mapping[str, object], times: float, rng: np.random.Generator) -> Outcome:
+def simulate_from(
+    river: CertifiedRiver, figures: Mapping[str, object], times: float, rng: np.random.Generator
+) -> Outcome:
     """Simulate a hand of `HANDS` from a random state at which √V is `times` its value at the region's edge."""
     curve, device = river.curve, river.device
     hand = HandImpedance(*(float(rng.uniform(*getattr(HANDS, name))) for name in ("mass", "damping", "stiffness")))

@@ -2,7 +2,7 @@
 
 from controllers.certificates.loop.laws import FOLLOW_LAW
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
 
@@ -12,4 +12,4 @@ SAMPLING = Sampling(1e-3)
 
 
 def river(law=FOLLOW_LAW, k_r=300.0, b_d=8.0, width=0.25, curve=CIRCLE, sampling=SAMPLING):
-    return River(law, k_r, b_d, width, curve, DEVICE, sampling)
+    return CertifiedRiver(law, k_r, b_d, width, curve, DEVICE, sampling)

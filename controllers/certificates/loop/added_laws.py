@@ -9,8 +9,8 @@ import numpy as np
 from controllers.certificates.loop.case_hull import slopes_of
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.law_cases import MAX_CASES, Cases
-from controllers.certificates.loop.laws import Law
-from controllers.certificates.loop.stability import N_PHASES, River
+from controllers.certificates.loop.laws import SymbolicLaw
+from controllers.certificates.loop.stability import N_PHASES, CertifiedRiver
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.errors import ControllerError
 from geometry.arrays import Array
@@ -20,7 +20,7 @@ from geometry.arrays import Array
 N_REFERENCES = 20 * N_PHASES
 
 
-def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
+def rivers_with(river: CertifiedRiver, added: Sequence[Cases]) -> list[CertifiedRiver]:
     """A river with user-defined laws: one linear loop, or several between which the laws' cases switch.
 
     A law of one expression is added as it is. A law with several cases is replaced by each of the slopes whose convex
@@ -30,7 +30,7 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
 
     Parameters
     ----------
-    river : River
+    river : CertifiedRiver
         The law that drives the hand along the curve, with its gains.
     added : sequence of Cases
         User-defined laws.
@@ -58,7 +58,9 @@ def rivers_with(river: River, added: Sequence[Cases]) -> list[River]:
     return [river._replace(law=_law_with_added(river, smooth, switched, slope)) for slope in combined]
 
 
-def _law_with_added(river: River, smooth: Sequence[Cases], switched: Sequence[Cases], slope: Array) -> Law:
+def _law_with_added(
+    river: CertifiedRiver, smooth: Sequence[Cases], switched: Sequence[Cases], slope: Array
+) -> SymbolicLaw:
     """The river's law, plus F_i of the smooth laws, plus F_i(x_0) + G (x − x_0) of the others for one slope G."""
     base, k_r = river.law, river.k_r
 

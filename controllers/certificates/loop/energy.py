@@ -23,7 +23,7 @@ from controllers.certificates.loop.device import kinematics_function
 from controllers.certificates.loop.injected import BANDS, Injection, injection
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.report import Verdict
 from controllers.fields.algebra.weights import window
 from controllers.fields.follow import PACE_RANGE
@@ -38,14 +38,14 @@ class Drag(NamedTuple):
     coulomb: Array
 
 
-def drag(river: River, linear: LinearLoop) -> Drag:
+def drag(river: CertifiedRiver, linear: LinearLoop) -> Drag:
     """The device's friction at the tip, along the curve."""
     along = linear.velocity / np.linalg.norm(linear.velocity, axis=1, keepdims=True)
     joints = joint_motion(linear.jacobian, along)
     return Drag(joints**2 @ np.array(river.device.viscous), np.abs(joints) @ np.array(river.device.coulomb))
 
 
-def terminal_speed(river: River, linear: LinearLoop) -> Array:
+def terminal_speed(river: CertifiedRiver, linear: LinearLoop) -> Array:
     """Speed [m/s] of a relaxed hand in the flow at every phase: (b_d |φ̇| − f_c)/(b_d + b), at least 0."""
     friction, pace = drag(river, linear), np.linalg.norm(linear.velocity, axis=1)
     return np.maximum(0.0, (river.b_d * pace - friction.coulomb) / (river.b_d + friction.viscous))
@@ -83,7 +83,7 @@ def peak_gain(loop: SampledLoop, k_r: float, b_d: float) -> PeakGain:
     return PeakGain(*(float(gain.max()) for gain in gains))
 
 
-def own_force(river: River, linear: LinearLoop) -> Array:
+def own_force(river: CertifiedRiver, linear: LinearLoop) -> Array:
     """U_0 [N] at every phase: force at the tip that motion along the curve at its own speed needs."""
     kinematics = kinematics_function(river.device).map(len(linear.phases))
     acceleration = river.curve.acceleration(linear.phases)
@@ -102,7 +102,7 @@ def own_force(river: River, linear: LinearLoop) -> Array:
     return inertia + stiction + river.b_d * np.linalg.norm(acceleration, axis=1) * lag
 
 
-def distance_bound(river: River, gain: float, force: float) -> float:
+def distance_bound(river: CertifiedRiver, gain: float, force: float) -> float:
     """Smallest R [m] with R = G (U + k_r R (1 − w(R/ε)) + b_d s R); inf if there is none within the tube."""
     radius, shear = 0.0, river.b_d * river.shear
     for _ in range(500):
@@ -121,7 +121,7 @@ class PushedRiver(NamedTuple):
 
     Attributes
     ----------
-    river : River
+    river : CertifiedRiver
     gain : PeakGain
     own : float
         Largest `own_force` [N].
@@ -129,7 +129,7 @@ class PushedRiver(NamedTuple):
         Force that the limiter lets through [N].
     """
 
-    river: River
+    river: CertifiedRiver
     gain: PeakGain
     own: float
     ceiling: float
@@ -160,7 +160,7 @@ class PushedRiver(NamedTuple):
         return allowed
 
 
-def energy(river: River, push: float, ceiling: float) -> Verdict:
+def energy(river: CertifiedRiver, push: float, ceiling: float) -> Verdict:
     """Verdict on the distance from the curve of a hand that pushes with at most `push` newtons, with FOLLOW.
 
     Certified if there is a bound within the tube and the curve's reach, where the nearest point is unique, and the
@@ -201,7 +201,7 @@ def energy(river: River, push: float, ceiling: float) -> Verdict:
     return Verdict("unknown", reason, allowed - push, assumptions, {}, figures)
 
 
-def _power_figures(river: River, moving: LinearLoop, executed: Injection) -> dict[str, object]:
+def _power_figures(river: CertifiedRiver, moving: LinearLoop, executed: Injection) -> dict[str, object]:
     """Figures on power and energy of a lap, for the ideal law and the executed one."""
     pace, speed, friction = _curve_speed(moving), terminal_speed(river, moving), drag(river, moving)
     lap, widening = river.curve.duration, PACE_RANGE[1] if river.law.parallel > 0.0 else 1.0

@@ -16,7 +16,7 @@ from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.hand_samples import States, states_about
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.fields.algebra.instructions import Join
 from controllers.fields.algebra.law import Program
 from controllers.fields.algebra.program import evaluate
@@ -82,7 +82,9 @@ def force_at(program: Program, memory: Array, p: Array, v: Array, t: float) -> A
     return wrench[:3].copy()
 
 
-def linearise_program(linear: LinearLoop, program: Program, river: River, states: States) -> ProgramLinearisation:
+def linearise_program(
+    linear: LinearLoop, program: Program, river: CertifiedRiver, states: States
+) -> ProgramLinearisation:
     """The linear loop of `river` with the program's derivatives at n hands; use it with k_r = 1, b_d = 0.
 
     `linear` has the plant at the same phases, possibly of a slowed-down curve; hands need not be on the curve. Their
@@ -126,7 +128,12 @@ def _derivative(changes: Sequence[Array]) -> Array | None:
 
 
 def examine_curve(
-    program: Program, river: River, reach: float, hands: Sequence[HandImpedance], pace: float = 1.0, n: int = 16
+    program: Program,
+    river: CertifiedRiver,
+    reach: float,
+    hands: Sequence[HandImpedance],
+    pace: float = 1.0,
+    n: int = 16,
 ) -> WorstState:
     """The worst of states on the curve, at rest and at `pace` times its speed, and of states `reach` [m] off it."""
     phases = river.phases(n)
@@ -140,13 +147,13 @@ def examine_curve(
     return _worst_state(program, river, states, hands)
 
 
-def examine_random_states(program: Program, river: River, hands: Sequence[HandImpedance]) -> WorstState:
+def examine_random_states(program: Program, river: CertifiedRiver, hands: Sequence[HandImpedance]) -> WorstState:
     """The worst of the random states about the curve (`states_about`), which a user-defined law cannot anticipate."""
     return _worst_state(program, river, [states_about(river.curve)], hands)
 
 
 def _worst_state(
-    program: Program, river: River, states: Sequence[States], hands: Sequence[HandImpedance]
+    program: Program, river: CertifiedRiver, states: Sequence[States], hands: Sequence[HandImpedance]
 ) -> WorstState:
     """The worst of several sets of states near the same phases, with every hand.
 
@@ -181,7 +188,7 @@ def _worst_state(
     return worst._replace(strongest=strongest, abrupt=tuple(abrupt))
 
 
-def _is_reachable(river: River, place: Array) -> bool:
+def _is_reachable(river: CertifiedRiver, place: Array) -> bool:
     """Whether the device reaches a position [m]."""
     try:
         river.device.angles(place)

@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from controllers.certificates.loop.device import Symbol, vector
 from controllers.certificates.loop.hand import NO_HAND, HandImpedance
-from controllers.certificates.loop.laws import Law, nearest_phase
+from controllers.certificates.loop.laws import SymbolicLaw, nearest_phase
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River, counterexample, stability
+from controllers.certificates.loop.stability import CertifiedRiver, counterexample, stability
 from controllers.certificates.report import Verdict
 from controllers.curves.trajectory import piece_velocity
 
@@ -30,7 +30,7 @@ from controllers.curves.trajectory import piece_velocity
 N_FREQUENCIES = 400
 
 
-def with_damper(base: Law, drag: float, k_r: float, b_d: float) -> Law:
+def with_damper(base: SymbolicLaw, drag: float, k_r: float, b_d: float) -> SymbolicLaw:
     """A law plus a damper −drag t (t·v) along the curve, scaled with the law's gain k_r (or b_d if k_r is 0)."""
 
     def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k: Symbol, b: Symbol, width: Symbol) -> Symbol:
@@ -64,7 +64,7 @@ def max_drag(loop: SampledLoop, k_r: float, b_d: float) -> float:
     return -1.0 / least if least < 0.0 else float("inf")
 
 
-def governed_stability(river: River, drag: float, hands: Sequence[HandImpedance]) -> Verdict:
+def governed_stability(river: CertifiedRiver, drag: float, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on a river's stability with a governor of a given drag [N s/m], for each of several hands.
 
     Certified if the river alone is certified and the circle criterion holds; refuted if the loop is unstable while the

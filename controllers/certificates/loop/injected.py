@@ -23,7 +23,7 @@ import numpy as np
 
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from geometry.arrays import Array
 
 BANDS = (30.0, 100.0, 300.0)  # [Hz] upper ends: hand motion and tremor; a tool on a table; what the skin feels
@@ -56,7 +56,7 @@ def activity(k: float, b: float, sampling: Sampling, frequency: Array) -> Array:
     return -stiffness.imag / omega
 
 
-def injection(river: River, linear: LinearLoop) -> Injection:
+def injection(river: CertifiedRiver, linear: LinearLoop) -> Injection:
     """Effect of sampling, filter, delay and quantisation, for springs across the curve and dampers in any direction."""
     nyquist = 0.5 / river.sampling.period
     frequency = np.geomspace(0.1, nyquist, 2000)

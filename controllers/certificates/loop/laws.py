@@ -15,7 +15,7 @@ from controllers.fields.follow import follow_force, parallel_pace
 from controllers.fields.stretchy_tubes import stretch_force
 
 
-class Law(NamedTuple):
+class SymbolicLaw(NamedTuple):
     """A force law on symbols.
 
     Attributes
@@ -51,7 +51,7 @@ class FollowForce:
     Attributes
     ----------
     parallel : float
-        As in `Law`.
+        As in `SymbolicLaw`.
     """
 
     parallel: float
@@ -59,7 +59,7 @@ class FollowForce:
     def __call__(
         self, p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_r: Symbol, b_d: Symbol, width: Symbol
     ) -> Symbol:
-        """The force, with the arguments of `Law.force`."""
+        """The force, with the arguments of `SymbolicLaw.force`."""
         nearest, pace = nearest_phase(p, piece, u), 1.0
         p_curve, v_curve = piece_point.py_func(piece, 0, nearest), piece_velocity.py_func(piece, 0, nearest)
         if self.parallel > 0.0:
@@ -88,20 +88,20 @@ def _hold(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_s: Symbol, b: Symbol
     return vector([stretch_force.py_func(p[i], v[i], target[i], k_s, b) for i in range(3)])
 
 
-def follow_law(parallel: float) -> Law:
+def follow_law(parallel: float) -> SymbolicLaw:
     """FOLLOW with the share ρ of a parallel flow; 0 for the paper's."""
-    return Law(FollowForce(parallel), slides=True, carries=True, parallel=parallel)
+    return SymbolicLaw(FollowForce(parallel), slides=True, carries=True, parallel=parallel)
 
 
 FOLLOW_LAW = follow_law(0.0)
-BUNNY_LAW = Law(_bunny, slides=False, carries=True)
-SEEK_LAW = Law(_seek, slides=True, carries=False)
-HOLD_LAW = Law(_hold, slides=False, carries=False)
+BUNNY_LAW = SymbolicLaw(_bunny, slides=False, carries=True)
+SEEK_LAW = SymbolicLaw(_seek, slides=True, carries=False)
+HOLD_LAW = SymbolicLaw(_hold, slides=False, carries=False)
 LAWS = {"follow": FOLLOW_LAW, "bunny": BUNNY_LAW, "seek": SEEK_LAW, "hold": HOLD_LAW}
 
 
 @lru_cache(FUNCTIONS_KEPT)
-def torque_function(device: Device, law: Law) -> Any:
+def torque_function(device: Device, law: SymbolicLaw) -> Any:
     """CasADi function (θ, ω, piece, u, k_r, b_d, width) → torques τ = J(θ)ᵀ F + N(θ), and their derivatives by θ, ω.
 
     ω are the filtered rates, independent of θ: the force is F(p(θ), J(θ) ω).

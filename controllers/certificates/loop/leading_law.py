@@ -16,7 +16,7 @@ import casadi
 import numpy as np
 
 from controllers.certificates.loop.device import Symbol, vector
-from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.laws import SymbolicLaw
 from controllers.certificates.loop.sampled_loop import UNDELAYED_SIZE, SampledLoop
 from controllers.curves.trajectory import piece_point, piece_velocity
 from controllers.fields.leading import LeadingGains, PathPoint, leading_force
@@ -55,7 +55,7 @@ class Regime(NamedTuple):
         c, s = np.cos(self.heading), np.sin(self.heading)
         return (c * x - s * y) / size, (s * x + c * y) / size
 
-    def law(self, scale: float, upright: float) -> Law:
+    def law(self, scale: float, upright: float) -> SymbolicLaw:
         """The law in this regime; `scale` is S, `upright` is k_z/k_l."""
 
         def force(p: Symbol, v: Symbol, piece: Symbol, u: Symbol, k_l: Symbol, b: Symbol, width: Symbol) -> Symbol:
@@ -70,7 +70,7 @@ class Regime(NamedTuple):
             gains = LeadingGains(k_l, b, upright * k_l, scale, lead, lead_back=_INACTIVE_WIDTH)
             return vector([*leading_force.py_func(p, v, path, gains)])
 
-        return Law(force, slides=not (self.ahead and self.aside), carries=False)
+        return SymbolicLaw(force, slides=not (self.ahead and self.aside), carries=False)
 
 
 def walking(loop: SampledLoop, regime: Regime, scale: float, rate: float, k_l: float, b: float) -> Array:

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from controllers.certificates.loop.device import Device, kinematics_function, plant_function
 from controllers.certificates.loop.hand import HandImpedance
-from controllers.certificates.loop.laws import Law, torque_function
+from controllers.certificates.loop.laws import SymbolicLaw, torque_function
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import CurveError
 from geometry.arrays import Array
@@ -84,7 +84,7 @@ class LinearLoop:
 
 
 def linearise(
-    device: Device, law: Law, curve: Trajectory, phases: Array, hand: HandImpedance, width: float = np.inf
+    device: Device, law: SymbolicLaw, curve: Trajectory, phases: Array, hand: HandImpedance, width: float = np.inf
 ) -> LinearLoop:
     """Linearise the loop at phases of a curve, about motion along it at its own speed.
 

@@ -15,7 +15,7 @@ import numpy as np
 from controllers.certificates.loop.hand import MAX_STIFFNESS, HandImpedance
 from controllers.certificates.loop.linear_loop import LinearLoop, joint_motion
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, counterexample
+from controllers.certificates.loop.stability import CertifiedRiver, counterexample
 from controllers.certificates.report import Verdict
 from geometry.arrays import Array
 
@@ -24,7 +24,7 @@ N_DIRECTIONS = 24  # directions across the curve, over half a turn; half or four
 N_FREQUENCIES = 4000
 
 
-def tip_friction(river: River, linear: LinearLoop) -> tuple[Array, Array, Array]:
+def tip_friction(river: CertifiedRiver, linear: LinearLoop) -> tuple[Array, Array, Array]:
     """The device's b [N s/m], f_c [N] and Δ [m] at the tip, in directions across the curve, each (n, DIRECTIONS).
 
     For a motion n of the tip the joints move by J⁻¹ n: b(n) = Σ D_i (J⁻¹n)_i², f_c(n) = Σ f_i |(J⁻¹n)_i|. A count
@@ -56,7 +56,7 @@ def damping_needed(k: float, b: float, sampling: Sampling) -> tuple[float, float
     return float(needed[worst]), float(angle[worst] / period)
 
 
-def passivity(river: River) -> Verdict:
+def passivity(river: CertifiedRiver) -> Verdict:
     """Verdict on passivity across the curve, for any passive hand.
 
     Certified by Colgate & Schenkel's general condition at every phase, in the worst direction; refuted by a passive

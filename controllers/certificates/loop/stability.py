@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.hand import MAX_DAMPING, MAX_STIFFNESS, NO_HAND, HandImpedance
-from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.laws import SymbolicLaw
 from controllers.certificates.loop.linear_loop import LinearLoop, linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import MAX_DELAY_PERIODS, Sampling
@@ -28,10 +28,24 @@ LIMITER_FACTORS = (0.05, 0.1, 0.2, 0.4, 0.7)  # factors by which the limiter may
 MAX_MARGIN_PERIODS = 16  # periods of delay at which the search for the delay margin ends
 
 
-class River(NamedTuple):
-    """System to be certified: law, gains and width (ε or δ [m]), curve, device and sampling."""
+class CertifiedRiver(NamedTuple):
+    """One force law closed with the device, as it is certified.
 
-    law: Law
+    Attributes
+    ----------
+    law : SymbolicLaw
+        The law; of a river, or of a tube or a leash.
+    k_r, b_d : float
+        Its stiffness [N/m] and damping [N s/m].
+    width : float
+        ε or δ, radius of the tube in which it acts [m], infinite if it acts everywhere.
+    curve : Trajectory
+        φ, in H.
+    device, sampling
+        The device's dynamics; period, delay and velocity filter of the loop.
+    """
+
+    law: SymbolicLaw
     k_r: float
     b_d: float
     width: float
@@ -134,7 +148,7 @@ def delay_margin(loop: SampledLoop, k_r: float, b_d: float) -> float:
     return float(low)
 
 
-def lap_multipliers(river: River, linear: LinearLoop) -> Array:
+def lap_multipliers(river: CertifiedRiver, linear: LinearLoop) -> Array:
     """Floquet multipliers of a lap transverse to the curve, complex, the largest first; `linear` moves along it."""
     periods = max(1, round(river.curve.duration / river.sampling.period / LAP_PHASES))
     n = max(1, round(river.curve.duration / river.sampling.period / periods))
@@ -173,7 +187,7 @@ class _HandResults(NamedTuple):
         return float(np.abs(following - here).max())
 
 
-def _evaluate_hands(river: River, hands: Sequence[HandImpedance]) -> _HandResults:
+def _evaluate_hands(river: CertifiedRiver, hands: Sequence[HandImpedance]) -> _HandResults:
     """Evaluate the loop with every hand."""
     critical, multipliers, bounds, cut = list[Array](), list[float](), list[float](), 0.0
     for hand in hands:
@@ -187,7 +201,7 @@ def _evaluate_hands(river: River, hands: Sequence[HandImpedance]) -> _HandResult
     return _HandResults(np.array(critical), max(bounds), cut, max(multipliers, default=None))
 
 
-def _critical_stiffness_near(loop: SampledLoop, river: River) -> Array:
+def _critical_stiffness_near(loop: SampledLoop, river: CertifiedRiver) -> Array:
     """Critical k_r [N/m] at every phase: the next above the river's own; where that is unstable, the smallest.
 
     Infinite where there is none.
@@ -200,7 +214,7 @@ def _critical_stiffness_near(loop: SampledLoop, river: River) -> Array:
     return np.where(above > own, above, np.minimum(below, own))
 
 
-def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
+def stability(river: CertifiedRiver, hands: Sequence[HandImpedance]) -> Verdict:
     """Verdict on the river's linear stability along its curve, for each of several hands.
 
     Certified if, with every hand, three conditions hold. At every phase of a grid, k_r is below the critical value by
@@ -230,7 +244,7 @@ def stability(river: River, hands: Sequence[HandImpedance]) -> Verdict:
     return Verdict("certified", f"stable: {summary}", margin, assumptions, {}, figures)
 
 
-def _reason_not_certified(river: River, found: _HandResults, least: float) -> str | None:
+def _reason_not_certified(river: CertifiedRiver, found: _HandResults, least: float) -> str | None:
     """Reason why a river with k_r below the least critical value is not certified; None if it is."""
     if found.multiplier is not None and found.multiplier >= 1.0:
         return f"stable with the phase held, but a multiplier of the lap is {found.multiplier:.4g}"
@@ -242,7 +256,7 @@ def _reason_not_certified(river: River, found: _HandResults, least: float) -> st
     return None
 
 
-def _figures(river: River, found: _HandResults) -> dict[str, object]:
+def _figures(river: CertifiedRiver, found: _HandResults) -> dict[str, object]:
     """Figures of the verdict; radius, decay rate, critical damping and delay margin are for a stylus without a hand."""
     unloaded = river.loop()
     radius = unloaded.radius(river.k_r, river.b_d)
@@ -259,12 +273,12 @@ def _figures(river: River, found: _HandResults) -> dict[str, object]:
     }
 
 
-def counterexample(river: River, hand: HandImpedance, at: int) -> dict[str, object]:
+def counterexample(river: CertifiedRiver, hand: HandImpedance, at: int) -> dict[str, object]:
     """Counterexample of a river that is unstable at one of its phases: phase, place, hand, state ξ and growth rate.
 
     Parameters
     ----------
-    river : River
+    river : CertifiedRiver
     hand : HandImpedance
         Hand on the stylus.
     at : int
@@ -299,7 +313,7 @@ def growing_mode(loop: SampledLoop, k_r: float, b_d: float, at: int) -> tuple[Ar
     return 1e-3 * mode.real, float(np.log(np.abs(value))) / loop.sampling.period
 
 
-def boundary(river: River, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
+def boundary(river: CertifiedRiver, damping: Array, hand: HandImpedance = NO_HAND) -> Array:
     """Stability boundary: critical k_r [N/m], the smallest over the phases, for each b_d in `damping` [N s/m]."""
     loop = river.loop(hand)
 

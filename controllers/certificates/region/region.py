@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.certificates.loop.hand import HandRange
 from controllers.certificates.loop.laws import HOLD_LAW, SEEK_LAW, FollowForce
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.region.decrease_check import Checked, check_form
 from controllers.certificates.region.lyapunov import Axis, Cell, Form, Limits, find_form
 from controllers.certificates.region.remainder import Course, Remainder, remainder
@@ -116,7 +116,7 @@ class Search(NamedTuple):
     frozen: CertifiedRegion | None
 
 
-def search(river: River, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
+def search(river: CertifiedRiver, axis: Axis, tube: TubeBounds, hands: HandRange, ceiling: float) -> Search:
     """Search for one form for all hands in given intervals.
 
     Parameters
@@ -194,7 +194,7 @@ def _firm_part(hands: HandRange) -> HandRange:
     return HandRange(upper(*hands.mass), upper(*hands.damping), (low, low + STIFF_HAND_FRACTION * (high - low)))
 
 
-def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
+def region(river: CertifiedRiver, hands: HandRange, ceiling: float, linear: Verdict) -> Verdict:
     """Verdict on a region about the curve that is attracted to a smaller ball about it, for every hand in intervals.
 
     Certified if V decreases on the whole region in spite of the remainder; the margin is the offset [m] from which a
@@ -203,7 +203,7 @@ def region(river: River, hands: HandRange, ceiling: float, linear: Verdict) -> V
 
     Parameters
     ----------
-    river : River
+    river : CertifiedRiver
         System to be certified.
     hands : HandRange
         Intervals of mass, damping, and stiffness about the nearest point.

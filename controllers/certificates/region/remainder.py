@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.certificates.loop.laws import Law
+from controllers.certificates.loop.laws import SymbolicLaw
 from controllers.certificates.region.lyapunov import Axis, Cell, Form
 from controllers.certificates.region.tube_bounds import TubeBounds
 from controllers.curves.trajectory import Trajectory
@@ -42,7 +42,7 @@ class Course(NamedTuple):
     shear: float
 
     @staticmethod
-    def of(curve: Trajectory, law: Law, n: int = 4000) -> "Course":
+    def of(curve: Trajectory, law: SymbolicLaw, n: int = 4000) -> "Course":
         """Evaluate a curve on a grid that is fine compared with the pieces of its spline."""
         phases = np.linspace(curve.start, curve.end, n)
         velocity, acceleration = curve.velocity(phases), curve.acceleration(phases)

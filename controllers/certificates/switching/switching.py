@@ -33,7 +33,7 @@ import numpy as np
 from controllers.certificates.loop.energy import own_force, peak_gain
 from controllers.certificates.loop.linear_loop import LinearLoop
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.report import Verdict
 from controllers.certificates.switching.common_lyapunov import Common
 from controllers.curves.closest_point import closest_phases
@@ -93,7 +93,7 @@ class CompetingRiver:
     width: float
 
 
-def competing_river(held: River, other: River) -> CompetingRiver:
+def competing_river(held: CertifiedRiver, other: CertifiedRiver) -> CompetingRiver:
     """Another river relative to `held`, at the phases of `held`."""
     points, velocity = held.curve.point(held.phases()), held.curve.velocity(held.phases())
     phases, distance = closest_phases(other.curve.packed(), points)
@@ -130,8 +130,8 @@ class Bounds:
 class HandRetention:
     """One river of a bundle with the others as competitors: bounds under which it keeps its hand."""
 
-    held: River
-    others: tuple[River, ...]
+    held: CertifiedRiver
+    others: tuple[CertifiedRiver, ...]
     sharing: SelectionRule
 
     @cached_property

@@ -13,7 +13,7 @@ import numpy as np
 
 from controllers.certificates.loop.device import Device
 from controllers.certificates.loop.sampled_loop import SampledLoop
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.fields.algebra.instructions import TRACE_RIVER
 from controllers.fields.algebra.program import evaluate
 from controllers.fields.higher_order import HigherOrder
@@ -158,7 +158,7 @@ Simulation = Callable[[Array, Array, float, Push], Course]
 def counterexample(
     field: HigherOrder,
     own: int,
-    river: River,
+    river: CertifiedRiver,
     phase: float,
     towards: Array,
     pushes: Iterable[float],
@@ -176,7 +176,7 @@ def counterexample(
         The rivers.
     own : int
         Number of the river among them.
-    river : River
+    river : CertifiedRiver
         The same river in the form that is certified.
     phase : float
         Phase at which another river meets it [s].

@@ -10,7 +10,7 @@ from controllers.certificates.loop.leading_law import Regime, walking
 from controllers.certificates.loop.linear_loop import linearise
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River, stability
+from controllers.certificates.loop.stability import CertifiedRiver, stability
 from controllers.fields.algebra.instructions import TRACE_SIZE
 from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading, leading_wrench
@@ -34,7 +34,7 @@ FLUTTER = Regime(True, True, True, 3.0)
 
 
 def _river(regime, b=8.0):
-    return River(regime.law(SCALE, STIFFNESS_RATIO), 120.0, b, np.inf, CURVE, DEVICE, Sampling(1e-3))
+    return CertifiedRiver(regime.law(SCALE, STIFFNESS_RATIO), 120.0, b, np.inf, CURVE, DEVICE, Sampling(1e-3))
 
 
 @pytest.mark.parametrize("name", TRIALS)

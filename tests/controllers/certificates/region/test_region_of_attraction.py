@@ -11,7 +11,7 @@ from controllers.certificates.loop.device import kinematics_function, plant_func
 from controllers.certificates.loop.hand import NO_HANDS, HandRange
 from controllers.certificates.loop.laws import BUNNY_LAW, FOLLOW_LAW, follow_law
 from controllers.certificates.loop.sampling import Sampling
-from controllers.certificates.loop.stability import River
+from controllers.certificates.loop.stability import CertifiedRiver
 from controllers.certificates.region.decrease_check import check_form
 from controllers.certificates.region.intervals import bounds, spectral_bound
 from controllers.certificates.region.lyapunov import Axis, Cell, Limits, decrease, find_form
@@ -23,7 +23,7 @@ from experiments.certify.certified_device import phantom_device
 from tests.derivatives import central_differences
 
 SLOW = Trajectory.circle(0.0477, 12.0)
-RIVER = River(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))
+RIVER = CertifiedRiver(FOLLOW_LAW, 300.0, 8.0, 0.25, SLOW, phantom_device(), Sampling(1e-3))
 AXIS = Axis(300.0, 8.0, 1e-3, RIVER.sampling.keep, 0, True)
 STABLE = Verdict("certified", "")
 
