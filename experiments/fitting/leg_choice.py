@@ -107,7 +107,7 @@ def select_legs(
                 verdict = trial_of(haptic_map, lap, parallel).verdict()
                 if verdict.acceptable and verdict.residual <= _GOOD_RESIDUAL:
                     return haptic_map, ()
-                if verdict.worse() < (-best_verdict.fell, best_verdict.residual - least_gain):
+                if verdict.is_better(best_verdict, least_gain):
                     best, name, best_verdict, least_gain = haptic_map, names[i], verdict, 0.0
             if best_verdict.acceptable and (best_verdict.residual <= _SAFE_RESIDUAL or share <= _LEAST_SHARE):
                 return best, ()
@@ -156,7 +156,7 @@ def followed_map(
         part = haptic_map.with_legs_of(clip, arms, share)
         verdict = trial_of(part).verdict()
         least_gain = _LEAST_GAIN * best_verdict.acceptable
-        if verdict.worse() < (-best_verdict.fell, best_verdict.residual - least_gain):
+        if verdict.is_better(best_verdict, least_gain):
             best, best_verdict = part, verdict
         if best_verdict.acceptable and best_verdict.residual <= _GOOD_RESIDUAL:
             break

@@ -14,7 +14,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.hand_tours import domain, poses_about_circle
-from experiments.fitting.verdict import MAX_FOOT_SKATE, Motion, motion_of
+from experiments.fitting.verdict import MAX_FOOT_SKATE, MotionFaults, motion_faults
 from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES
 
@@ -37,7 +37,7 @@ def moves_alike(haptic_map: Cylindrical, lap: float) -> bool:
     """
 
     def find() -> Array:
-        return np.array([motion_at(haptic_map, place, lap) for place in (_MIDDLE, *_CORNERS)])
+        return np.array([faults_at(haptic_map, place, lap) for place in (_MIDDLE, *_CORNERS)])
 
     made_of = (haptic_map.compiled().params, np.array([lap]))
     found = cached_array(__name__, "alike", made_of, (5, 4), find)
@@ -53,21 +53,21 @@ def carries_alike(haptic_map: Composite, lap: float) -> bool:
     own = Composite(lower, lower, lower, haptic_map.upper_joints, haptic_map.r_range, haptic_map.limbs, haptic_map.lap)
 
     def find() -> Array:
-        others = [motion_at(haptic_map, (r, 0.0), lap) for r in (0.0, 0.5, 1.0)]
-        return np.array([motion_at(own, _MIDDLE, lap), *others])
+        others = [faults_at(haptic_map, (r, 0.0), lap) for r in (0.0, 0.5, 1.0)]
+        return np.array([faults_at(own, _MIDDLE, lap), *others])
 
     made_of = (haptic_map.compiled().params, np.array([lap]))
     found = cached_array(__name__, "carries", made_of, (4, 4), find)
     return bool(found[1:, 0].max() < found[0, 0] + _MAX_EXCESS_RESIDUAL)
 
 
-def motion_at(haptic_map: Cylindrical | Composite, place: tuple[float, float], lap: float) -> Motion:
+def faults_at(haptic_map: Cylindrical | Composite, place: tuple[float, float], lap: float) -> MotionFaults:
     """Measure a lap [s] of a map round a circle, at shares `place` of its domain in r and z; needs compiled code."""
     low, high = domain(haptic_map).T
     r, z = low + np.array(place) * (high - low)
     rows = max(64, round(_FPS * lap))
     # The last pose repeats the first, as in a closed clip: otherwise the motion would count as one that stops.
-    return motion_of(poses_about_circle(haptic_map, r, 2.0 * np.pi * np.arange(rows + 1) / rows, z), rows / lap)
+    return motion_faults(poses_about_circle(haptic_map, r, 2.0 * np.pi * np.arange(rows + 1) / rows, z), rows / lap)
 
 
 def arms(legs: Sequence[Limb]) -> list[int]:

@@ -25,7 +25,7 @@ TRIAL_SECONDS, FPS = 20.0, 120.0
 """Least duration of a trial [s], and frame rate of the animation that is followed [1/s]: that of prepared clips."""
 
 
-class Motion(NamedTuple):
+class MotionFaults(NamedTuple):
     """Measures of a motion's faults.
 
     Attributes
@@ -44,7 +44,7 @@ class Motion(NamedTuple):
     furthest: float
 
 
-def motion_of(poses: Array, fps: float) -> Motion:
+def motion_faults(poses: Array, fps: float) -> MotionFaults:
     """Measure a motion (n, 75)."""
     # Imported here: they load signal processing, which a run with cached results does not need.
     from models.mocap.motion.kinematics import sole_points
@@ -57,7 +57,7 @@ def motion_of(poses: Array, fps: float) -> Motion:
     schedule = stances(clip, smoothed(clip))
     support = contact_forces(clip, schedule)
     found, lowest = skates(clip, schedule, support.loads), sole_points(poses)[:, :, 2].min() - CONTACT_RADIUS
-    return Motion(support.residual, float(lowest), float(np.quantile(found, 0.95)), float(found.max()))
+    return MotionFaults(support.residual, float(lowest), float(np.quantile(found, 0.95)), float(found.max()))
 
 
 class Verdict(NamedTuple):
@@ -84,9 +84,9 @@ class Verdict(NamedTuple):
         """Whether it does not fall and its residual is at most `MAX_RESIDUAL_IN_FLIGHTS`."""
         return not self.falls and self.residual <= MAX_RESIDUAL_IN_FLIGHTS
 
-    def worse(self) -> tuple[float, float]:
-        """Sort key that is larger for a worse verdict: first by an earlier fall, then by the residual."""
-        return -self.fell, self.residual
+    def is_better(self, other: "Verdict", gain: float) -> bool:
+        """Whether the figure falls later than in another one, or else its residual is smaller by more than `gain`."""
+        return (-self.fell, self.residual) < (-other.fell, other.residual - gain)
 
     def __str__(self) -> str:
         """In words, as the end of a sentence about the figure."""
@@ -135,8 +135,8 @@ class Trial(NamedTuple):
 
         def find() -> Array:
             shown = self.show()
-            motion = motion_of(shown.poses, shown.fps)
-            return np.array([[motion.lowest, motion.skate, motion.furthest, beyond_ranges(shown.poses).max()]])
+            faults = motion_faults(shown.poses, shown.fps)
+            return np.array([[faults.lowest, faults.skate, faults.furthest, beyond_ranges(shown.poses).max()]])
 
         lowest, skate, furthest, beyond = self._cached("sound", 4, find)
         skate = furthest if in_every_stance else skate

@@ -23,7 +23,7 @@ from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import best_lap, closed_loops, not_blendable, off_pace, timing_clip
-from experiments.fitting.verdict import motion_of
+from experiments.fitting.verdict import motion_faults
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
@@ -136,7 +136,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
 
 def animation_measures(poses: Array, fps: float) -> dict[str, float]:
     """Lowest sole [cm], foot skate in a stance (95 %, largest) [cm], and joints beyond limits [°] of the animation."""
-    motion = motion_of(poses, fps)
+    motion = motion_faults(poses, fps)
     excess = float(beyond_ranges(poses).max()) - MAX_LIMIT_EXCESS
     return {
         "lowest": 100 * motion.lowest, "skate": 100 * motion.skate, "slid": 100 * motion.furthest,

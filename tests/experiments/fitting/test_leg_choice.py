@@ -184,5 +184,5 @@ def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
     assert trial_of(maps[1], LAP, False).is_sound()
     walk, run = trial_of(maps[1], LAP, False).verdict(), trial_of(maps[0], LAP, False).verdict()
     assert walk.acceptable
-    assert run.worse() > walk.worse()
+    assert walk.is_better(run, 0.0)
     assert not run.acceptable

@@ -14,7 +14,7 @@ from experiments.files.map_files import save_map
 from experiments.fitting import hand_tours, leg_choice, verdict
 from experiments.fitting.hand_tours import tour_along_curve
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import Motion, Trial, Verdict
+from experiments.fitting.verdict import MotionFaults, Trial, Verdict
 from experiments.lifting.lift import lift_clips
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model, rest_pose
@@ -141,7 +141,7 @@ def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_pa
 def test_one_stance_of_many_in_which_a_push_drags_a_foot_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pushes come once a lap; the measure of a map's animation otherwise leaves out a twentieth of the stances."""
     still = Clip(np.repeat(rest_pose()[None], 4, axis=0), 120.0, "still")
-    monkeypatch.setattr(verdict, "motion_of", lambda *_: Motion(0.0, 0.0, 0.01, 0.06))
+    monkeypatch.setattr(verdict, "motion_faults", lambda *_: MotionFaults(0.0, 0.0, 0.01, 0.06))
     trial = Trial(__name__, lambda: still, 1.0, (np.random.default_rng().random(8),))
     assert trial.is_sound()
     assert not trial.is_sound(in_every_stance=True)

@@ -10,8 +10,8 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
-from experiments.fitting.similarity import motion_at
-from experiments.fitting.verdict import motion_of
+from experiments.fitting.similarity import faults_at
+from experiments.fitting.verdict import motion_faults
 from experiments.setups.wiring import wire
 from experiments.trials.trial.measures import TrialLog
 from models.mocap.library import embedded
@@ -63,16 +63,16 @@ def test_lap_at_map_corner_has_the_residual_of_its_clip() -> None:
     clip = embedded("walk")
     haptic_map = wire(run_config(clips=("walk",) * 4, lap=clip.duration, seconds=1.0)).haptic_map
     assert isinstance(haptic_map, Cylindrical)
-    corner, own = motion_at(haptic_map, (0.0, 0.0), clip.duration), motion_of(clip.poses, clip.fps)
+    corner, own = faults_at(haptic_map, (0.0, 0.0), clip.duration), motion_faults(clip.poses, clip.fps)
     assert corner.residual == pytest.approx(own.residual, abs=0.002)
     assert corner.skate == pytest.approx(own.skate, abs=0.005)
 
 
 def test_authored_walk_feet_neither_sink_nor_skate() -> None:
-    motion = motion_of(embedded("walk").poses, embedded("walk").fps)
+    motion = motion_faults(embedded("walk").poses, embedded("walk").fps)
     assert motion.lowest > -0.005
     assert motion.skate < 0.01
     # A walk that is carried sideways skates as far as it is carried in a stance.
     carried = embedded("walk").poses.copy()
     carried[:, 1] += 0.1 * np.arange(len(carried)) / embedded("walk").fps
-    assert 0.03 < motion_of(carried, embedded("walk").fps).skate < 0.12
+    assert 0.03 < motion_faults(carried, embedded("walk").fps).skate < 0.12
