@@ -9,6 +9,7 @@ from controllers.fields.algebra.instructions import TRACE_DISTANCE, TRACE_PHASE,
 from controllers.state import (
     HAND_ANGULAR_VELOCITY,
     HAND_QUATERNION,
+    HAND_SIZE,
     HAND_SWITCH,
     HAND_TIME,
     HAND_VELOCITY,
@@ -49,7 +50,7 @@ def make_logs(servo: Servo, ticks: int) -> tuple[TickLog, FrameLog]:
     frames = -(-ticks // servo.figure_ticks)
     return (
         TickLog(
-            hand=np.zeros((ticks, 15)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
+            hand=np.zeros((ticks, HAND_SIZE)), field=np.zeros((ticks, 6)), force=np.zeros((ticks, 3)),
             user=np.zeros((ticks, 3)), tank=np.zeros((ticks, 2)), torque=np.zeros((ticks, 3)),
             trace=np.zeros((ticks, TRACE_SIZE)), ctrl=np.zeros((ticks, len(plant.ctrl))),
             applied=np.zeros((ticks, plant.substeps, user_torques(servo.device))),

@@ -41,7 +41,12 @@ STACK = 16  # depth of the stack: largest number of pending wrenches
 TRACE_PHASE, TRACE_POINT, TRACE_DISTANCE, TRACE_ROW, TRACE_ATTRACTOR, TRACE_RIVER, TRACE_SIZE = 0, 1, 4, 5, 6, 7, 8
 
 Kernel = Callable[[Array, int, int, Array, int, Array, Array], None]
-"""Compiled law ``kernel(params, at, curve, memory, slot, hand, wrench)``: writes the wrench and its own memory."""
+"""Compiled law ``kernel(params, at, curve, memory, slot, hand, wrench)``.
+
+It reads its parameters from ``params[at:]``, its curve from ``params[curve:]`` and the hand vector of
+`controllers.state`; it writes force [N] and moment [N m] in H into `wrench` (6,), and what it keeps until the next tick
+into ``memory[slot:]``. All laws of a field share the two arrays. A law that leads along a curve writes the trace too
+(`write_trace`)."""
 
 VECTOR = types.Array(types.float64, 1, "C")
 """Type of a row of numbers."""

@@ -211,7 +211,7 @@ class PathMeasure:
         self._pushing = bool(at_work[-1])
 
     def summary(self) -> PathSummary:
-        """What was taken so far."""
+        """The measures of all blocks added so far."""
         laps = self._phase_travelled / self._span
         seconds, clip = self._last_time - self._start_time, self._clip_seconds
         lap_seconds = seconds / laps if laps >= 1.0 else None
@@ -265,7 +265,7 @@ class AnimationMeasure:
         self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
 
     def summary(self) -> AnimationSummary:
-        """What was taken so far."""
+        """The measures of all blocks added so far."""
         lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
         return AnimationSummary(
             math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide, self._fastest

@@ -204,7 +204,10 @@ class FigureSummary:
     seconds, up_seconds : float
         Time measured [s], and the part of it in which the figure was up: neither lying after a fall nor being set back
         onto the animation. All measures below are over that part.
-    joint_error_rms_deg, root_error_rms_cm, root_error_max_cm : float
+    joint_error_rms_deg : float
+        Angle between a joint's rotation and that of the reference, RMS over joints and time [°].
+    root_error_rms_cm, root_error_max_cm : float
+        Distance of the root from that of the reference [cm].
     residual_force_rms : float
         RMS residual force while the reference is in stance, as a share of body weight; that of `stance`.
     stance, flight, without_ground_force : Residual
@@ -268,7 +271,17 @@ class FigureSummary:
 
 @dataclass(frozen=True)
 class SpeedSummary:
-    """Cost of the run: simulated over real time, time until the first tick [s], peak memory [MB]."""
+    """Cost of the run.
+
+    Attributes
+    ----------
+    real_time_factor : float
+        Simulated over real time.
+    first_tick_seconds : float
+        Time until the first tick [s].
+    peak_memory_mb : float
+        Largest memory of the process [MB].
+    """
 
     real_time_factor: float
     first_tick_seconds: float
