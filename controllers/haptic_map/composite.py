@@ -77,7 +77,7 @@ class Composite(AnimationMap):
         for limb in limbs:
             if set(limb.joints) & set(upper_joints):
                 raise ParameterError(f"a limb of joints {limb.joints} shares some with the upper body's {upper_joints}")
-        self.r_range, self.upper_joints, self.apart = r_range, tuple(upper_joints), apart
+        self.r_range, self.upper_joints = r_range, tuple(upper_joints)
         numbers = checked_interval("r_range", r_range, AXIS)
         super().__init__((lower, red, blue), (*numbers, 1.0), upper_joints, limbs, lap,
                          apart)  # fmt: skip

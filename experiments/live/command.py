@@ -17,7 +17,7 @@ from sim.errors import SimError
 LEAST_TOKEN = 16  # [characters] shortest token that may be given, so that it cannot be guessed
 
 
-def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") -> None:
+def live(config: RunConfig, host: str, port: int, out: Path, given: str) -> None:
     """Serve the live page of a run that a person drives.
 
     Parameters
@@ -29,7 +29,7 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str = "") ->
     out : Path
         Folder for takes and clips.
     given : str
-        Token; by default a new one is generated if the host needs one.
+        Token of the page's address; if empty, a new one is generated where the host needs one.
 
     Raises
     ------

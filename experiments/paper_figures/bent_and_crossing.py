@@ -96,7 +96,7 @@ def crossing_rivers(runs: Path) -> Figure:
     ax = workspace(figure, grid[0], np.concatenate((all_points, hand)), 30.0, 1.2)
     for course in drawn:
         path(ax, MILLIMETRES * course.points, course.line, "", 0.9, (0, (4, 3)))
-    colored_path(ax, hand, colors, 1.6)
+    colored_path(ax, hand, colors)
     change_rows = [int(np.searchsorted(t, change.t)) for change in changes]
     ax.plot(*hand[change_rows].T, "o", color=CURVE, ms=5.0)
     handles = [Line2D([], [], color=course.line, lw=2.0, label=f"river “{course.name}”") for course in drawn]

@@ -44,7 +44,7 @@ def path(ax: Axes3D, points: Array, color: str, label: str = "", width: float = 
     ax.plot(*points.T, color=color, lw=width, ls=dashes, label=label or None)
 
 
-def colored_path(ax: Axes3D, points: Array, colors: list[str], width: float = 2.0) -> None:
+def colored_path(ax: Axes3D, points: Array, colors: list[str]) -> None:
     """A line through points (n, 3), each segment in the colour of its first point."""
     pieces = np.stack((points[:-1], points[1:]), axis=1)
-    ax.add_collection3d(Line3DCollection(list(pieces), colors=colors[:-1], linewidths=width))
+    ax.add_collection3d(Line3DCollection(list(pieces), colors=colors[:-1], linewidths=1.6))

@@ -135,8 +135,8 @@ def crossing_figure() -> Figure:
     return figure
 
 
-def _axes(size: tuple[float, float]) -> tuple[Figure, Axes]:
-    figure = Figure(figsize=size, layout="constrained")
+def _axes() -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(4.6, 4.4), layout="constrained")
     return figure, figure.subplots()
 
 
@@ -155,7 +155,7 @@ def _draw_plane(ax: Axes, curves: list[Trajectory], epsilon: float) -> tuple[Arr
 
 def force_figure(field: Law, curves: list[Trajectory], epsilon: float, t: float) -> Figure:
     """Force of a field on a hand at rest in the plane z = 0, at time t [s]."""
-    figure, ax = _axes((4.6, 4.4))
+    figure, ax = _axes()
     x, y = _draw_plane(ax, curves, epsilon)
     forces = np.array([field.wrench(HandState.at([a, b, 0.0], t=t)).force for a, b in zip(x.flat, y.flat, strict=True)])
     size = np.linalg.norm(forces, axis=1)
@@ -173,7 +173,7 @@ def edited_figure() -> Figure:
     times = np.linspace(0.0, 4.0, 401)
     bump = 0.02 * np.sin(0.5 * np.pi * np.clip(times - 1.0, 0.0, 2.0)) ** 2
     performed = performance(times, river.curve.point(times) * (1.0 + bump / 0.05)[:, None])
-    figure, ax = _axes((4.6, 4.4))
+    figure, ax = _axes()
     _draw_plane(ax, [river.curve], 0.0)
     for weight, colour in ((0.5, TUBE), (1.0, FIELD)):
         edited = Edited(river, (performed,), (weight,))

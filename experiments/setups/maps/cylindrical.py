@@ -92,7 +92,7 @@ def composite_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Plac
     lower, red, blue = motions_of(clips, PARTS, "composite")
     legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
-    apart = out_of_step(clips, 3, lap)
+    apart = out_of_step(clips, PARTS, lap)
     haptic_map = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
 
     def refined() -> tuple[CompositeMap, tuple[str, ...]]:

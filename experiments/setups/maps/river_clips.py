@@ -21,6 +21,7 @@ from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
+_RIVER_COUNT = 3  # rivers about a circle (`river_bundle`), each with a clip
 _MAX_LAPS = 4  # laps in a round: with more, a hand waits long for a transition, and there are many to compute
 
 
@@ -37,35 +38,34 @@ def river_clips_setup(
     mode = config.mode
     if not isinstance(mode, Rivers) or mode.crossing == "sum":
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
-    motions, place = motions_of(clips, 3, part.kind), place_of(part)
+    motions, place = motions_of(clips, _RIVER_COUNT, part.kind), place_of(part)
+    played = [clips[i % len(clips)] for i in range(_RIVER_COUNT)]
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
-    laps, apart = _fit_round(clips, 3, place.curve.duration)
+    laps, apart = _fit_round(played, place.curve.duration)
     haptic_map = RiverClipsMap(
         curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
     parts = about_circle(place, haptic_map, clips, in_rounds=True)
-    names = [clips[i % len(clips)].name for i in range(3)]
 
     def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
         ready = with_rests(haptic_map, figure)
         if config.figure.kind != "physical" or same(clips):
             return ready, ()
         changing = with_changes(ready, config.figure.blend, figure)
-        return changing, tour_remarks(changing, names, config.figure, figure)
+        return changing, tour_remarks(changing, [clip.name for clip in played], config.figure, figure)
 
     remark = f"a round of the clips takes {laps} laps of the hand, so that each keeps its speed"
     return replace(parts.with_remarks((remark,)) if laps > 1 else parts, plays_rivers=True, refined=refined)
 
 
-def _fit_round(clips: tuple[Clip, ...], count: int, lap: float) -> tuple[int, bool]:
-    """Fewest laps of a round in which clips on `count` rivers keep their pace, and whether their strides are apart.
+def _fit_round(played: list[Clip], lap: float) -> tuple[int, bool]:
+    """Fewest laps of a round in which the rivers' clips keep their pace, and whether their strides are apart.
 
     If there are none, the laps for which the largest deviation of a clip from its own pace is smallest.
     """
-    if same(clips):
+    if same(played):
         return 1, False
-    played, best = [clips[i % len(clips)] for i in range(count)], (np.inf, 1, True)
-    loops = closed_loops(played)
+    loops, best = closed_loops(played), (np.inf, 1, True)
     for laps in range(1, _MAX_LAPS + 1):
         for apart in (False, True):
             fitted = fit_to_lap(loops, laps * lap, apart)
