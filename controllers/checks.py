@@ -30,6 +30,14 @@ def checked(name: str, value: float, unit: str, least: float = 0.0, infinite: bo
     return number
 
 
+def check_positive(what: str, part: object, *names: str) -> None:
+    """Raise unless attributes of a part, by default all, are positive and finite; `what` is its name in the message."""
+    for name in names or vars(part):
+        value = getattr(part, name)
+        if not (np.isfinite(value) and value > 0.0):
+            raise ParameterError(f"{name} of {what} is {value}; expected more than 0, and finite")
+
+
 def check_field_types(part: object) -> None:
     """Raise if the value of a dataclass field is not of the type of its annotation.
 

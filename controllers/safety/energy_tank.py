@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from controllers.checks import check_field_types
+from controllers.checks import check_field_types, check_positive
 from controllers.errors import ParameterError
 from geometry.arrays import Array
 
@@ -105,14 +105,11 @@ class EnergyTank:
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        for name in ("period", "power", "capacity", "drain_time", "initial"):
-            value = getattr(self, name)
-            if name == "initial" and value is None:
-                continue
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} of the energy tank must be positive and finite, got {value}")
-        if self.initial is not None and self.initial > self.capacity:
-            raise ParameterError(f"an energy tank of {self.capacity} J cannot hold {self.initial} J at first")
+        check_positive("the energy tank", self, "period", "power", "capacity", "drain_time")
+        if self.initial is not None:
+            check_positive("the energy tank", self, "initial")
+            if self.initial > self.capacity:
+                raise ParameterError(f"an energy tank of {self.capacity} J cannot hold {self.initial} J at first")
         if self.drain_time < 2.0 * self.period:
             raise ParameterError(
                 f"a tank that empties in {self.drain_time} s needs a period of at most {0.5 * self.drain_time} s, "

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
+from controllers.checks import check_positive
 from controllers.errors import ParameterError
 from controllers.safety import arming
 from controllers.safety.arming import motors_on, next_state
@@ -203,10 +204,8 @@ class Gate:
     oscillation: OscillationDetector | None = field(default=None)
 
     def __post_init__(self) -> None:
-        for name in ("period", "force", "slew", "speed", "speed_margin", "margin", "small", "quiet", "ramp"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} of the gate must be positive and finite, got {value}")
+        positive = ("period", "force", "slew", "speed", "speed_margin", "margin", "small", "quiet", "ramp")
+        check_positive("the gate", self, *positive)
         if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
             raise ParameterError(f"a workspace from {self.low} to {self.high} m has no room in it")
 

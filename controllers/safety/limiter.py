@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from controllers.checks import check_positive
 from controllers.errors import ParameterError
 from controllers.safety.faults import FORCE_NOT_FINITE, LIMITER_NOT_FINITE
 from geometry.arrays import Array
@@ -144,10 +145,7 @@ class ForceLimiter:
     slew: float = 5000.0
 
     def __post_init__(self) -> None:
-        for name in ("period", "continuous", "peak", "thermal_time", "slew"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} of the limiter must be positive and finite, got {value}")
+        check_positive("the limiter", self, "period", "continuous", "peak", "thermal_time", "slew")
         if self.peak < self.continuous:
             raise ParameterError(f"peak force {self.peak} N is below the continuous force {self.continuous} N")
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from controllers.errors import ParameterError
+from controllers.checks import check_positive
 from geometry.arrays import Array, Mask
 
 _PERIOD, _LOW_PASS, _THRESHOLD, _COUNT_DECAY, _MAX_COUNT, _GAIN_FALL, _GAIN_RISE, _TIME_DECAY, _MAX_TIME = range(9)
@@ -106,9 +106,7 @@ class OscillationDetector:
     forget: float = 5.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"{name} of the oscillation detector must be positive and finite, got {value}")
+        check_positive("the oscillation detector", self)
 
     def params(self) -> Array:
         """Parameters of `oscillation_gain`."""

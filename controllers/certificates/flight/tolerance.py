@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from controllers.checks import check_positive
 from controllers.errors import ParameterError
 from geometry.physics import FRICTION, GRAVITY
 
@@ -45,10 +46,7 @@ class BallisticTolerance:
     def __post_init__(self) -> None:
         if not 0.0 < self.gravity[0] < GRAVITY < self.gravity[1]:
             raise ParameterError(f"tolerance of gravity {self.gravity} m/s²; expected 0 < low < {GRAVITY} < high")
-        for name in ("distance", "misfit", "drift", "yaw", "clearance"):
-            value = float(getattr(self, name))
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"BallisticTolerance.{name} is {value}; expected a finite number > 0")
+        check_positive("BallisticTolerance", self, "distance", "misfit", "drift", "yaw", "clearance")
 
 
 @dataclass(frozen=True)
@@ -89,9 +87,7 @@ class ContactTolerance:
     outlier: float = 8.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f"ContactTolerance.{name} is {value}; expected a finite number > 0")
+        check_positive("ContactTolerance", self)
 
 
 @dataclass(frozen=True)
@@ -118,8 +114,7 @@ class JudgementCriteria:
     contact: ContactTolerance = field(default_factory=ContactTolerance)
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction > 0.0):
-            raise ParameterError(f"the coefficient of friction is {self.friction}; expected a finite number > 0")
+        check_positive("the floor", self, "friction")
 
 
 DEFAULT_CRITERIA = JudgementCriteria()
