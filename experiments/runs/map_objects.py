@@ -23,7 +23,8 @@ from experiments.files.given_path import given_path
 from experiments.files.map_files import load_figure_map
 from experiments.runs.short_text import short_text
 from experiments.setups.maps.about_circle import Place, check_clips
-from experiments.setups.maps.cylindrical import CORNERS, PARTS, composite_parts, cylindrical_parts
+from experiments.setups.maps.composite import PARTS, composite_parts
+from experiments.setups.maps.cylindrical import CORNERS, cylindrical_parts
 from experiments.setups.maps.map_file import fitted_to_pushes, lifted_parts
 from experiments.setups.maps.robot_arm import arm_parts
 from experiments.setups.modes.lifted_runs import curve_number

@@ -10,11 +10,13 @@ from experiments.config.maps import Composite, Cylindrical, Led, Map, RobotArm
 from experiments.config.run_config import RunConfig
 from experiments.fitting.blendable import longest_flight
 from experiments.setups.maps.about_circle import place_of
-from experiments.setups.maps.cylindrical import composite_parts, cylindrical_parts
+from experiments.setups.maps.composite import composite_parts
+from experiments.setups.maps.cylindrical import cylindrical_parts
 from experiments.setups.maps.map_file import map_file_setup
 from experiments.setups.maps.river_clips import river_clips_setup
 from experiments.setups.maps.robot_arm import arm_parts, tilted
-from experiments.setups.modes.fixed_curve import bunny_parts, flows_parallel, follow_parts
+from experiments.setups.modes.bunny import bunny_parts
+from experiments.setups.modes.follow import flows_parallel, follow_parts
 from experiments.setups.modes.lead import lead_parts
 from experiments.setups.modes.rivers import rivers_parts
 from experiments.setups.modes.stretch import stretch_parts, stretch_then_follow_parts

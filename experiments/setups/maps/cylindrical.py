@@ -1,4 +1,4 @@
-"""Set-ups of two maps about a circle: four clips at a hollow cylinder's corners, and three that share the body."""
+"""Set-up of the cylindrical map: four clips at the corners of a hollow cylinder's cross-section."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 
 from controllers.blending.clip_arrays import clip_arrays
-from controllers.haptic_map.composite import Composite as CompositeMap
 from controllers.haptic_map.cylindrical import Cylindrical as CylindricalMap
 from controllers.haptic_map.cylindrical import LegsOfOneClip, correction_shape
 from controllers.legs.limbs import Limb
@@ -15,7 +14,7 @@ from experiments.fitting.balance import with_balance
 from experiments.fitting.blendable import going_round, keep_own_pace, same, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
-from experiments.fitting.similarity import arms, carries_alike, moves_alike, upper_joints
+from experiments.fitting.similarity import arms, moves_alike
 from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
@@ -74,32 +73,3 @@ def _cached_map(
     shape = (-1, *correction_shape(len(legs)))
     corrections = cached_array(CylindricalMap.__module__, "corrections", made_of, shape, find)
     return CylindricalMap(clips, radii, heights, legs, corrections, lap)
-
-
-PARTS = 3  # number of clips
-
-
-def composite_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Place, parallel: bool) -> ClipMapParts:
-    """Map parts of the lower body of one clip and an upper body blended between two more; fewer clips are repeated.
-
-    `parallel` is as in `cylindrical_parts`.
-
-    Raises
-    ------
-    ControllerError
-        If there are no clips, or more than three, or they do not fit together.
-    """
-    lower, red, blue = motions_of(clips, PARTS, "composite")
-    legs, radii = figure_legs(figure), place.radii()
-    lap = place.curve.duration
-    apart = out_of_step(clips, PARTS, lap)
-    haptic_map = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
-
-    def refined() -> tuple[CompositeMap, tuple[str, ...]]:
-        if carries_alike(haptic_map, lap):
-            return haptic_map, ()
-        only = CompositeMap(lower, red, blue, arms(legs), radii, legs, lap, apart)
-        return select_legs(lambda _: only, [clips[0].name], lap, parallel)
-
-    parts = about_circle(place, haptic_map, clips, timing=0)
-    return replace(parts, refined=refined).with_remarks(going_round(clips, legs))

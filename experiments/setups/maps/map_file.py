@@ -15,7 +15,7 @@ from experiments.files.map_files import load_figure_map, map_digest
 from experiments.fitting.blendable import not_blendable
 from experiments.fitting.leg_choice import followed_map
 from experiments.fitting.similarity import arms
-from experiments.setups.modes.fixed_curve import flows_parallel
+from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.modes.lifted_runs import (
     HELD_GAINS,
     best_transition,

@@ -1,4 +1,4 @@
-"""Runs along a curve that is not bent: the parts common to their modes, and those of FOLLOW and the bunny."""
+"""What modes along a curve that is not bent have in common: FOLLOW, the bunny and rivers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,9 +9,6 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
-from controllers.fields.bunny import Bunny as BunnyLaw
-from controllers.fields.follow import PACE_RANGE
-from controllers.fields.follow import Follow as FollowLaw
 from controllers.fields.orientation import Orientation
 from controllers.fields.soft_wall import SoftWall
 from controllers.haptic_map.base import HapticMap
@@ -21,10 +18,8 @@ from controllers.state import stylus_path
 from experiments.config.modes import Bunny, Follow, JointWalls, OrientationMoment, Rivers
 from experiments.config.run_config import RunConfig
 from experiments.results.measures.run_measures import trace_summary
-from experiments.setups.parts.budget import fastest, tank_for
-from experiments.setups.parts.governor import governed
+from experiments.setups.parts.budget import tank_for
 from experiments.setups.parts.hands import handling_spans, late_remark, resolved_user, turning_remark, user_hand
-from experiments.setups.parts.pace import compensation, course_of
 from experiments.setups.parts.part_types import ClipMapParts, Notes, Parts
 from models.humanoid.skeleton import JOINTS, N_POSE, N_TANGENT, joint_range
 from sim.users.hand.actions import Push
@@ -135,41 +130,4 @@ def figure_walls(haptic_map: HapticMap, walls: JointWalls) -> SoftWall:
     columns, rows = range(N_POSE - 4 * n, N_POSE, 4), range(N_TANGENT - 3 * n, N_TANGENT, 3)
     return SoftWall(
         haptic_map, tuple(columns), tuple(rows), tuple(limits), walls.wall_stiffness, margin, BRAKE_DAMPING, speed
-    )
-
-
-def follow_parts(config: RunConfig, mode: Follow, maps: ClipMapParts) -> Parts:
-    """Parts of a run in the mode "follow"."""
-    parallel = mode.flow == "parallel"
-    # With a parallel flow a hand that runs outside a bend needs no course that is faster there.
-    course = course_of(maps.curve, mode.damping, 0.0 if parallel else mode.stiffness)
-    law = FollowLaw(
-        course, mode.stiffness, mode.damping, mode.tube, parallel, compensation(maps.curve, course) * parallel
-    )
-    law, urged = governed(mode.governor, law, course, maps)
-    power = river_power(mode.damping, (PACE_RANGE[1] if parallel else 1.0) * fastest(course))
-    springs = ((mode.stiffness, mode.tube),)
-    field = FixedField(law, course, power, springs, Notes("FOLLOW", maps.reach), urged, mode.tube)
-    return fixed_curve_parts(config, mode, maps, field)
-
-
-def flows_parallel(config: RunConfig) -> bool:
-    """Whether the field keeps the pace of a hand that is pushed off its curve."""
-    return isinstance(config.mode, Follow) and config.mode.flow == "parallel"
-
-
-def bunny_parts(config: RunConfig, mode: Bunny, maps: ClipMapParts) -> Parts:
-    """Parts of a run in the mode "bunny".
-
-    Besides its damper, the moving spring injects at most min(k_r δ e^{-1/2}, F_p) |φ̇|, with the limiter's peak F_p.
-    """
-    course, width = maps.curve, mode.bunny_width
-    bunny = BunnyLaw(course, mode.stiffness, mode.damping, width, mode.bunny_attraction, mode.bunny_pace)
-    law, urged = governed(mode.governor, bunny, course, maps)
-    pace, force = fastest(course), ForceLimiter(config.clock.servo_period).peak
-    power = river_power(mode.damping, pace) + pace * min(mode.stiffness * width * np.exp(-0.5), force)
-    # The attractor's potential, ∫ k s exp(−s²/2δ²) ds = k δ², is the energy of a linear spring of reach √2 δ.
-    springs = ((mode.stiffness, np.sqrt(2.0) * width),)
-    return fixed_curve_parts(
-        config, mode, maps, FixedField(law, course, power, springs, Notes("BUNNY", maps.reach), urged)
     )

@@ -11,7 +11,7 @@ from rich.text import Text
 from experiments.config.part import to_json
 from experiments.config.run_config import RunConfig
 from experiments.console.compiling import compiler
-from experiments.setups.modes.fixed_curve import flows_parallel
+from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.parts.defaults import resolved
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyError

@@ -15,7 +15,7 @@ from experiments.config.maps import Composite, Cylindrical
 from experiments.config.part import from_json, to_dict
 from experiments.config.run_config import RunConfig
 from experiments.results.folder import RECORDING
-from experiments.setups.modes.fixed_curve import flows_parallel
+from experiments.setups.modes.follow import flows_parallel
 from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.part_types import MapParts
 from experiments.setups.session import Session
