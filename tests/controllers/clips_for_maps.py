@@ -56,6 +56,11 @@ def stylus(r, angle, z):
     return np.array([r * np.cos(angle), r * np.sin(angle), z, 1.0, 0.0, 0.0, 0.0])
 
 
+def walker(s, held=0.0):
+    """Argument of the map of a led figure at arc length s [m]; `held` is 1 for the grounded form of its gait."""
+    return np.array([s, held, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
 def displaced(x, tangent):
     """A stylus pose moved by tangent[:3] [m] and turned by the rotation vector tangent[3:] in the hand frame H."""
     turn = Rotation.from_rotvec(tangent[3:]) * Rotation.from_quat(np.roll(x[3:], -1))

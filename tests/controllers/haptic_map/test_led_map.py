@@ -8,17 +8,12 @@ from controllers.haptic_map.led import Led
 from controllers.walking.walked_path import PATH_HEADING, STEP, lay_row, lean_row, path_front, path_value, straight_path
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.led_figure import led_map
-from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import pose_difference
-from tests.controllers.clips_for_maps import LEG, difference, swinging
+from tests.controllers.clips_for_maps import LEG, difference, swinging, walker
 from tests.controllers.figure_soles import slide, soles
 from tests.derivatives import central_differences
-
-
-def walker(s):
-    return np.array([s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def winding(gait, bend, length=9.0):
@@ -31,11 +26,6 @@ def winding(gait, bend, length=9.0):
         lay_row(path, turn * STEP, bend, turn * gait.speed**2)
         lean_state = lean_row(path, 20, np.exp(-STEP / (gait.speed * 0.32)), lean_state)
     return path
-
-
-@pytest.fixture(scope="module")
-def figure():
-    return figure_model()
 
 
 @pytest.mark.parametrize("name", ["walk", "run"])

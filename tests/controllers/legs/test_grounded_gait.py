@@ -6,21 +6,12 @@ import pytest
 from controllers.haptic_map.led import Led
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.led_figure import led_map
-from models.humanoid.skeleton import figure_model
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
 from models.mocap.motion.clip import pose_difference
+from tests.controllers.clips_for_maps import walker
 from tests.controllers.figure_soles import slide, soles
 from tests.derivatives import central_differences
-
-
-def walker(s, held):
-    return np.array([s, held, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
-@pytest.fixture(scope="module")
-def figure():
-    return figure_model()
 
 
 @pytest.fixture(scope="module")

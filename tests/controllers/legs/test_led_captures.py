@@ -10,11 +10,10 @@ from experiments.config.modes import Lead
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.modes.lead import leading
 from experiments.setups.parts.led_figure import MAX_STEP, led_clips, led_map
-from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from tests.captures import MOCAP, needs_mocap
-from tests.controllers.clips_for_maps import difference
+from tests.controllers.clips_for_maps import difference, walker
 from tests.controllers.figure_soles import slide, soles
 from tests.derivatives import central_differences
 
@@ -23,10 +22,6 @@ CAPTURES = (
     "deepmimic/humanoid3d_run.txt", "snu/walk.bvh", "snu/run.bvh", "xia/strutting_01_000.bvh", "xia/angry_13_000.bvh",
     "xia/dme_example.bvh",
 )  # fmt: skip
-
-
-def walker(s: float, held: float = 0.0) -> np.ndarray:
-    return np.array([s, held, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def bent_path(gait, bend: float, length: float) -> np.ndarray:
@@ -38,11 +33,6 @@ def bent_path(gait, bend: float, length: float) -> np.ndarray:
         turn = min(feet, 1) * bend * np.sin(1.5 * path[0] * STEP)
         lay_row(path, turn * STEP, bend, 0.0)
     return path
-
-
-@pytest.fixture(scope="module")
-def figure():
-    return figure_model()
 
 
 def test_captured_run_steps_instead_of_flying(figure) -> None:
