@@ -63,8 +63,8 @@ def about_circle(
     (`timing_clip`); `in_rounds` says whether the clips may be played in rounds of several laps.
     """
     curve, reach = place.curve, place.reach
-    played = [clips[i % len(clips)] for i in range(len(haptic_map.loops))]
     timing = timing_clip(clips) if timing is None else timing
+    played = _repeated(clips, len(haptic_map.loops))
     off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing, in_rounds)
     return ClipMapParts(
         haptic_map=haptic_map, clips=clips, curve=curve, reach=reach,
@@ -87,16 +87,21 @@ def check_clips(clips: Sequence[Clip], most: int, name: str) -> None:
         raise ParameterError(f"got {len(clips)} --clips; expected 1 to {most} for the {name} map")
 
 
-def motions_of(clips: tuple[Clip, ...], most: int, name: str) -> list[tuple[Array, float]]:
-    """Poses and frame rates of as many motions as a map takes; if there are fewer clips, they are repeated."""
-    check_clips(clips, most, name)
-    return [(clips[i % len(clips)].poses, clips[i % len(clips)].fps) for i in range(most)]
+def _repeated(clips: Sequence[Clip], count: int) -> list[Clip]:
+    return [clips[i % len(clips)] for i in range(count)]
 
 
-def out_of_step(clips: tuple[Clip, ...], count: int, lap: float) -> bool:
-    """Whether a lap [s] with all clips in step would play some of them too far from their own pace.
+def played_clips(clips: Sequence[Clip], count: int, name: str) -> list[Clip]:
+    """The clips that a map plays: those given, repeated until there are `count`; raises as `check_clips`."""
+    check_clips(clips, count, name)
+    return _repeated(clips, count)
 
-    `count` is the number of clips that the map takes; if there are fewer, they are repeated.
-    """
-    played = [clips[i % len(clips)] for i in range(count)]
-    return not same(clips) and not keeps_pace(played, fit_to_lap(closed_loops(played), lap), lap)
+
+def motions_of(played: Sequence[Clip]) -> list[tuple[Array, float]]:
+    """Poses and frame rates of clips, as maps take them."""
+    return [(clip.poses, clip.fps) for clip in played]
+
+
+def out_of_step(played: Sequence[Clip], lap: float) -> bool:
+    """Whether a lap [s] with all clips in step would play some of them too far from their own pace."""
+    return not same(played) and not keeps_pace(played, fit_to_lap(closed_loops(played), lap), lap)

@@ -9,7 +9,7 @@ from experiments.fitting.blendable import going_round
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs
 from experiments.fitting.similarity import arms, carries_alike, upper_joints
-from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, played_clips
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
 
@@ -26,10 +26,11 @@ def composite_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Plac
     ControllerError
         If there are no clips, or more than three, or they do not fit together.
     """
-    lower, red, blue = motions_of(clips, PARTS, "composite")
+    played = played_clips(clips, PARTS, "composite")
+    lower, red, blue = motions_of(played)
     legs, radii = figure_legs(figure), place.radii()
     lap = place.curve.duration
-    apart = out_of_step(clips, PARTS, lap)
+    apart = out_of_step(played, lap)
     haptic_map = CompositeMap(lower, red, blue, upper_joints(legs), radii, legs, lap, apart)
 
     def refined() -> tuple[CompositeMap, tuple[str, ...]]:

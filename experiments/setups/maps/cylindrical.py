@@ -15,7 +15,7 @@ from experiments.fitting.blendable import going_round, keep_own_pace, same, timi
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, moves_alike
-from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step
+from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, played_clips
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
 from models.mocap.motion.clip import CLOSURE_TOLERANCE, Clip
@@ -33,17 +33,17 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
     ControllerError
         If there are no clips, or more than four, or they do not fit together.
     """
-    motions, reach = motions_of(clips, CORNERS, "cylindrical"), place.reach
-    radii, legs, lap = place.radii(), figure_legs(figure), place.curve.duration
+    played, reach = played_clips(clips, CORNERS, "cylindrical"), place.reach
+    motions, radii, legs, lap = motions_of(played), place.radii(), figure_legs(figure), place.curve.duration
 
     def with_legs_of(owner: int) -> CylindricalMap:
-        name = clips[owner % len(clips)].name
-        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, LegsOfOneClip(owner, arms(legs), name))
+        own = LegsOfOneClip(owner, arms(legs), played[owner].name)
+        return CylindricalMap(motions, radii, (-reach, reach), legs, None, lap, own)
 
     def choose_legs() -> tuple[CylindricalMap, tuple[str, ...]]:
         return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
-    if out_of_step(clips, len(motions), lap):
+    if out_of_step(played, lap):
         parts = about_circle(place, with_legs_of(timing_clip(clips)), clips)
         return replace(parts, refined=choose_legs).with_remarks(going_round(clips, legs))
     haptic_map = _cached_map(motions, radii, (-reach, reach), legs, lap)

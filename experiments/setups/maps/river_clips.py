@@ -16,7 +16,7 @@ from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.hand_tours import tour_remarks
 from experiments.fitting.rest_phases import with_rests
 from experiments.fitting.river_changes import with_changes
-from experiments.setups.maps.about_circle import about_circle, motions_of, place_of
+from experiments.setups.maps.about_circle import about_circle, motions_of, place_of, played_clips
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.part_types import ClipMapParts
 from models.mocap.motion.clip import Clip
@@ -38,12 +38,11 @@ def river_clips_setup(
     mode = config.mode
     if not isinstance(mode, Rivers) or mode.crossing == "sum":
         raise ParameterError("the rivers' map needs --mode rivers, and a --crossing that gives the hand to one river")
-    motions, place = motions_of(clips, _RIVER_COUNT, part.kind), place_of(part)
-    played = [clips[i % len(clips)] for i in range(_RIVER_COUNT)]
+    played, place = played_clips(clips, _RIVER_COUNT, part.kind), place_of(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     laps, apart = _fit_round(played, place.curve.duration)
     haptic_map = RiverClipsMap(
-        curves, motions, mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
+        curves, motions_of(played), mode.river_tube, figure_legs(figure), laps * place.curve.duration, apart, laps
     )  # fmt: skip
     parts = about_circle(place, haptic_map, clips, in_rounds=True)
 
