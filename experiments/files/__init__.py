@@ -1,1 +1,1 @@
-"""Arrays, maps and fields in files."""
+"""Maps, curves, certificates and devices in files; pages, and arrays that are cached."""

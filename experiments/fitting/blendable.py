@@ -29,14 +29,14 @@ def longest_flight(clip: Clip) -> float:
     return max((end - start for start, end in spans(flying)), default=0) / clip.fps
 
 
-def same(clips: Sequence[Clip]) -> bool:
+def all_same(clips: Sequence[Clip]) -> bool:
     """Whether all clips have the same poses."""
     return all(np.array_equal(clip.poses, clips[0].poses) for clip in clips)
 
 
 def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
     """Remarks on clips that cannot be blended with the others, a line each; none if all clips are the same."""
-    if same(clips):
+    if all_same(clips):
         return ()
     lines: list[str] = []
     for clip in {clip.name: clip for clip in clips}.values():
@@ -51,7 +51,7 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
 
 def going_round(clips: Sequence[Clip], legs: Sequence[Limb]) -> tuple[str, ...]:
     """Remarks on clips in which a joint that is no limb's goes round; none if all clips are the same."""
-    if same(clips):
+    if all_same(clips):
         return ()
     free = [joint - 1 for joint in range(1, len(BODIES)) if all(joint not in leg.joints for leg in legs)]
     lines: list[str] = []
@@ -72,7 +72,7 @@ def timing_clip(clips: Sequence[Clip]) -> int:
     return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
 
 
-def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
+def lap_suits_blend(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool:
     """Whether a lap [s] plays all clips near enough to their own pace to be blended; flights have tighter limits."""
     paces = [loop.duration / lap for loop in loops]
     any_flight = any(longest_flight(clip) > 0.0 for clip in clips)
@@ -80,7 +80,7 @@ def keeps_pace(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) -> bool
     return all(slowest <= pace <= fastest for pace in paces)
 
 
-def keep_own_pace(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> bool:
+def lap_suits_each(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> bool:
     """Whether a round [s] plays every clip near enough to its own pace to be followed by itself."""
     return all(
         (MIN_FLYING_PACE if longest_flight(clip) > 0.0 else MIN_PACE) <= loop.duration / seconds <= MAX_FLYING_PACE
@@ -102,7 +102,7 @@ def best_lap(clips: Sequence[Clip], timing: int, in_rounds: bool) -> float:
     loops = closed_loops(clips)
     loops = [loops[timing], *loops[:timing], *loops[timing + 1 :]]
     lap = natural_lap(loops)
-    if not keeps_pace(clips, fit_to_lap(loops, lap), lap):
+    if not lap_suits_blend(clips, fit_to_lap(loops, lap), lap):
         lap = natural_lap(loops, apart=True)
     return round(lap / np.ceil(lap / _MAX_ROUND_LAP) if in_rounds else lap, 6)
 

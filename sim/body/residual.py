@@ -79,7 +79,7 @@ class ResidualMeasure:
         self._squares, self._largest, self._count = np.zeros(2), np.zeros(2), 0
 
     def add(self, wrenches: Array) -> None:
-        """Take forces [N] and moments [N m], shape (n, 6)."""
+        """Add forces [N] and moments [N m], shape (n, 6)."""
         sizes = np.linalg.norm(wrenches.reshape(-1, 2, 3), axis=2) / self._scale
         self._squares += np.sum(sizes**2, axis=0)
         self._largest = np.maximum(self._largest, sizes.max(axis=0, initial=0.0))

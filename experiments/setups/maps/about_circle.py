@@ -9,7 +9,7 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.motion.strides import fit_to_lap
 from experiments.config.maps import Composite, Cylindrical, RiverClips
-from experiments.fitting.blendable import closed_loops, keeps_pace, not_blendable, off_pace, same, timing_clip
+from experiments.fitting.blendable import all_same, closed_loops, lap_suits_blend, not_blendable, off_pace, timing_clip
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.lap import circle_of
@@ -104,4 +104,4 @@ def motions_of(played: Sequence[Clip]) -> list[tuple[Array, float]]:
 
 def out_of_step(played: Sequence[Clip], lap: float) -> bool:
     """Whether a lap [s] with all clips in step would play some of them too far from their own pace."""
-    return not same(played) and not keeps_pace(played, fit_to_lap(closed_loops(played), lap), lap)
+    return not all_same(played) and not lap_suits_blend(played, fit_to_lap(closed_loops(played), lap), lap)

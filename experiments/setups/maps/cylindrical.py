@@ -11,7 +11,7 @@ from controllers.haptic_map.cylindrical import LegsOfOneClip, correction_shape
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
-from experiments.fitting.blendable import going_round, keep_own_pace, same, timing_clip
+from experiments.fitting.blendable import all_same, going_round, lap_suits_each, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, moves_alike
@@ -49,10 +49,10 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
     haptic_map = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
     def refined() -> tuple[CylindricalMap, tuple[str, ...]]:
-        if same(clips):
+        if all_same(clips):
             balanced_map = with_balance(haptic_map, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keep_own_pace(clips[:1], haptic_map.loops[:1], lap)
+            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and lap_suits_each(clips[:1], haptic_map.loops[:1], lap)
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
         return (with_balance(haptic_map, figure, lap), ()) if moves_alike(haptic_map, lap) else choose_legs()
 

@@ -11,7 +11,7 @@ from controllers.motion.strides import fit_to_lap
 from experiments.config.maps import RiverClips
 from experiments.config.modes import Rivers
 from experiments.config.run_config import RunConfig
-from experiments.fitting.blendable import closed_loops, keep_own_pace, same
+from experiments.fitting.blendable import all_same, closed_loops, lap_suits_each
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.hand_tours import tour_remarks
 from experiments.fitting.rest_phases import with_rests
@@ -48,7 +48,7 @@ def river_clips_setup(
 
     def refined() -> tuple[RiverClipsMap, tuple[str, ...]]:
         ready = with_rests(haptic_map, figure)
-        if config.figure.kind != "physical" or same(clips):
+        if config.figure.kind != "physical" or all_same(clips):
             return ready, ()
         changing = with_changes(ready, config.figure.blend, figure)
         return changing, tour_remarks(changing, [clip.name for clip in played], config.figure, figure)
@@ -62,13 +62,13 @@ def _fit_round(played: list[Clip], lap: float) -> tuple[int, bool]:
 
     If there are none, the laps for which the largest deviation of a clip from its own pace is smallest.
     """
-    if same(played):
+    if all_same(played):
         return 1, False
     loops, best = closed_loops(played), (np.inf, 1, True)
     for laps in range(1, _MAX_LAPS + 1):
         for apart in (False, True):
             fitted = fit_to_lap(loops, laps * lap, apart)
-            if keep_own_pace(played, fitted, laps * lap):
+            if lap_suits_each(played, fitted, laps * lap):
                 return laps, apart
             error = max(abs(float(np.log(loop.duration / (laps * lap)))) for loop in fitted)
             best = min(best, (error, laps, apart))

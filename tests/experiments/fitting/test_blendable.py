@@ -12,7 +12,7 @@ from controllers.motion.loops import checked_clip, closed_loop
 from controllers.motion.strides import fit_to_lap, natural_lap
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import going_round, keeps_pace, not_blendable, off_pace, timing_clip
+from experiments.fitting.blendable import going_round, lap_suits_blend, not_blendable, off_pace, timing_clip
 from experiments.fitting.figure_legs import figure_legs
 from experiments.setups.parts.governor import speeds_along
 from experiments.setups.setups import map_parts
@@ -55,10 +55,10 @@ def test_pace_tolerance_is_tighter_if_a_clip_flies() -> None:
     walk, angry, run = embedded("walk"), embedded("angry"), embedded("run")
     loops = [closed_loop(checked_clip(clip.poses, clip.fps, clip.name), clip.fps) for clip in (walk, angry, run)]
     slower = replace(loops[1], duration=0.8 * loops[0].duration)
-    assert keeps_pace((walk, angry), (loops[0], slower), loops[0].duration)
-    assert not keeps_pace((run, angry), (loops[2], slower), loops[2].duration)
+    assert lap_suits_blend((walk, angry), (loops[0], slower), loops[0].duration)
+    assert not lap_suits_blend((run, angry), (loops[2], slower), loops[2].duration)
     slowest = replace(loops[1], duration=0.7 * loops[0].duration)
-    assert not keeps_pace((walk, angry), (loops[0], slowest), loops[0].duration)
+    assert not lap_suits_blend((walk, angry), (loops[0], slowest), loops[0].duration)
 
 
 def test_lap_is_timed_by_the_first_grounded_clip() -> None:
