@@ -8,7 +8,7 @@ from controllers.errors import ParameterError
 from experiments.config.maps import MapFile
 from experiments.config.run_config import RunConfig, phantom_of
 from experiments.files.map_files import load_figure_map
-from experiments.live.gate import LOCAL_HOSTS, Gate
+from experiments.live.access_gate import LOCAL_HOSTS, AccessGate
 from experiments.live.page import Page
 from experiments.live.panels.run_panel import MAX_SESSION_DURATION
 from experiments.setups.parts.clips import load_clips
@@ -56,7 +56,7 @@ def live(config: RunConfig, host: str, port: int, out: Path, given: str) -> None
         load_clips(config.map.clips, raw=True)
     page = Page(replace(config, seconds=MAX_SESSION_DURATION), out, port=0)
     try:
-        gate = Gate(host, port, page.port, token)
+        gate = AccessGate(host, port, page.port, token)
         try:
             print("\n".join(_startup_lines(host, gate.port, out, token)), flush=True)
             page.serve()

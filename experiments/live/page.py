@@ -15,7 +15,7 @@ import viser
 from experiments.config.maps import RiverClips
 from experiments.config.run_config import RunConfig
 from experiments.live.cap_hand import open_cap_hand
-from experiments.live.driver import Driver
+from experiments.live.driving_browser import DrivingBrowser
 from experiments.live.panels.clock_panel import ClockPanel, add_hand_keys
 from experiments.live.panels.gains_panel import GainsPanel
 from experiments.live.panels.plots import Plots
@@ -56,7 +56,7 @@ class Page:
     """
 
     def __init__(self, config: RunConfig, folder: Path, port: int = 8080, shadows: bool = True):
-        self.desk, self.driver = Desk(folder, self.say), Driver()
+        self.desk, self.driver = Desk(folder, self.say), DrivingBrowser()
         self._messages: list[str] = []
         self._closed, self._lock = threading.Event(), threading.RLock()
         with contextlib.redirect_stdout(io.StringIO()):  # the command prints the address of the gate instead

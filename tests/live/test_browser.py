@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.config.options import run_config
+from experiments.live.access_gate import AccessGate
 from experiments.live.cap_hand import CapHand
-from experiments.live.gate import Gate
 from experiments.live.panels.clock_panel import KEY_STEP
 from experiments.live.session.desk import MAX_UPLOAD_BYTES
 from models.mocap.library import load
@@ -254,7 +254,7 @@ def test_closed_tab_leaves_the_run_and_a_phone_takes_over(chromium: Any, tab: An
 
 
 def test_only_the_right_token_opens_the_page(chromium: Any, served: ServedPage) -> None:
-    gate = Gate("127.0.0.1", 0, served.page.port, TOKEN)
+    gate = AccessGate("127.0.0.1", 0, served.page.port, TOKEN)
     context = chromium.new_context()
     try:
         page = context.new_page()

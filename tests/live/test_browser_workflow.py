@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.config.options import run_config
-from experiments.live import driver
+from experiments.live import driving_browser
 from experiments.live.session.take_mix import FPS, TakeData
 from geometry.arrays import Array
 from sim.recording.recording import Recording
@@ -277,7 +277,7 @@ def test_second_browser_watches_and_takes_over_an_idle_driver(
         button(other, "Drive").click()
         other.get_by_text("Somebody drives.").last.wait_for()
         assert arbiter.client == first
-        monkeypatch.setattr(driver, "MAX_IDLE_TIME", 0.0)
+        monkeypatch.setattr(driving_browser, "MAX_IDLE_TIME", 0.0)
         button(other, "Drive").click()
         served.assert_until(lambda: arbiter.client not in (None, first), "the other one drives")
         button(other, "Reset").click()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.live.driver import Driver
+from experiments.live.driving_browser import DrivingBrowser
 from experiments.live.page import Page
 from experiments.live.panels.status import status_html
 from sim.errors import SimError
@@ -17,7 +17,7 @@ def page() -> Any:
     """A page without server and processes."""
     shown: Any = Page.__new__(Page)
     shown.driver, shown._messages, shown._lock, shown._lines = (
-        Driver(),
+        DrivingBrowser(),
         [],
         threading.RLock(),
         SimpleNamespace(content=""),

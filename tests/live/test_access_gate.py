@@ -7,8 +7,8 @@ import threading
 import pytest
 
 from controllers.errors import ParameterError
+from experiments.live.access_gate import AccessGate, Request, answer
 from experiments.live.command import token_for
-from experiments.live.gate import Gate, Request, answer
 
 TOKEN = "0123456789abcdef0123456789abcdef"
 
@@ -47,7 +47,7 @@ def get(port: int, path: str = "/", headers: dict[str, str] | None = None) -> ht
 
 
 def test_page_is_served_only_with_the_token(behind):
-    gate = Gate("127.0.0.1", 0, behind, TOKEN)
+    gate = AccessGate("127.0.0.1", 0, behind, TOKEN)
     try:
         assert get(gate.port).status == 403
         assert get(gate.port, "/?token=" + "f" * 32).status == 403
@@ -65,7 +65,7 @@ def test_page_is_served_only_with_the_token(behind):
 
 
 def test_web_socket_without_token_is_refused(behind):
-    gate = Gate("127.0.0.1", 0, behind, TOKEN)
+    gate = AccessGate("127.0.0.1", 0, behind, TOKEN)
     try:
         assert get(gate.port, headers={"Upgrade": "websocket", "Connection": "Upgrade"}).status == 403
     finally:
@@ -73,7 +73,7 @@ def test_web_socket_without_token_is_refused(behind):
 
 
 def test_second_request_on_one_connection_is_not_forwarded(behind):
-    gate = Gate("127.0.0.1", 0, behind, TOKEN)
+    gate = AccessGate("127.0.0.1", 0, behind, TOKEN)
     try:
         with socket.create_connection(("127.0.0.1", gate.port), timeout=10) as peer:
             head = f"GET / HTTP/1.1\r\nHost: x\r\nCookie: hvf_token={TOKEN}\r\n\r\n"
@@ -87,7 +87,7 @@ def test_second_request_on_one_connection_is_not_forwarded(behind):
 
 
 def test_malformed_request_is_answered_with_400(behind):
-    gate = Gate("127.0.0.1", 0, behind, TOKEN)
+    gate = AccessGate("127.0.0.1", 0, behind, TOKEN)
     try:
         with socket.create_connection(("127.0.0.1", gate.port), timeout=10) as peer:
             peer.sendall(b"nonsense\r\n\r\n")

@@ -80,7 +80,7 @@ def _response(code: int, status: str, body: str, extra_headers: str = "") -> byt
     return f"{head}{extra_headers}Cache-Control: no-store\r\nConnection: close\r\n\r\n".encode() + content
 
 
-class Gate:
+class AccessGate:
     """Server in front of a page on this machine.
 
     Parameters

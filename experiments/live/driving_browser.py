@@ -5,7 +5,7 @@ import time
 MAX_IDLE_TIME = 10.0  # [s] without an action after which another browser may take over
 
 
-class Driver:
+class DrivingBrowser:
     """The browser whose input counts: the first that acts, until it disconnects or another one takes over."""
 
     def __init__(self) -> None:

@@ -2,12 +2,12 @@
 
 import pytest
 
-from experiments.live import driver
-from experiments.live.driver import Driver
+from experiments.live import driving_browser
+from experiments.live.driving_browser import DrivingBrowser
 
 
 def test_first_active_client_drives_until_it_leaves():
-    arbiter = Driver()
+    arbiter = DrivingBrowser()
     assert arbiter.client is None
     assert arbiter.may(4)
     assert not arbiter.may(7)
@@ -19,11 +19,11 @@ def test_first_active_client_drives_until_it_leaves():
 
 def test_only_an_idle_driver_is_replaced(monkeypatch: pytest.MonkeyPatch):
     now = [100.0]
-    monkeypatch.setattr(driver.time, "monotonic", lambda: now[0])
-    arbiter = Driver()
+    monkeypatch.setattr(driving_browser.time, "monotonic", lambda: now[0])
+    arbiter = DrivingBrowser()
     arbiter.may(1)
     now[0] += 5.0
     assert not arbiter.take_over(2)
-    now[0] += driver.MAX_IDLE_TIME
+    now[0] += driving_browser.MAX_IDLE_TIME
     assert arbiter.take_over(2)
     assert not arbiter.may(1)
