@@ -6,8 +6,7 @@ import pytest
 from controllers.blending.combination import fresh_lap
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAP_Y, update_lap
 from tests.controllers.clips_for_maps import stylus
-from tests.controllers.haptic_map.test_cylindrical_map import MOVING
-from tests.controllers.haptic_map.test_lifted_map import MAP
+from tests.controllers.example_maps import CYLINDRICAL, LIFTED
 
 TURN = 2.0 * np.pi
 
@@ -45,7 +44,7 @@ def test_constant_turning_drift_accumulates_heading():
     assert memory[LAP_HEADING] == pytest.approx(4.0)
 
 
-@pytest.mark.parametrize(("haptic_map", "middle"), [(MAP, 0.05), (MOVING, 0.045)])
+@pytest.mark.parametrize(("haptic_map", "middle"), [(LIFTED, 0.05), (CYLINDRICAL, 0.045)])
 def test_radial_hand_motion_late_in_a_lap_barely_moves_the_figure(haptic_map, middle):
     memory, angle = haptic_map.compiled().memory, 5.8
     stylus_poses = [

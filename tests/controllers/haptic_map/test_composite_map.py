@@ -6,19 +6,9 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
-from controllers.legs.limbs import Limb
-from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
+from tests.controllers.clips_for_maps import LEG, difference, stylus
+from tests.controllers.example_maps import BLUE, COMPOSITE, LOWER, RED, R
 
-R = (0.03, 0.07)
-LOWER, RED, BLUE = (
-    (swinging(1, travel=1.2), 30.0),
-    (swinging(2, 90, travel=0.3, turns=1.0), 30.0),
-    (swinging(3, 150), 60.0),
-)
-MAP = Composite(LOWER, RED, BLUE, (3,), R)
-LOWER_LEG = Limb((1, 2, 3), LEG.offsets, LEG.axis, LEG.points)
-FOUR_JOINTS = [(np.hstack([poses, swinging(9, len(poses) - 1)[:, 7:11]]), fps) for poses, fps in (LOWER, RED, BLUE)]
-MAP_WITH_LEGS = Composite(*FOUR_JOINTS, (4,), R, [LOWER_LEG]).with_share(0.6)
 # Each clip alone, with the same alignment, at the corners of a cylinder.
 SINGLE_CLIPS = Cylindrical([LOWER, RED, BLUE, LOWER], R, (-0.01, 0.01))
 IN_LOWER, IN_RED, IN_BLUE = (R[0], -0.01), (R[1], -0.01), (R[0], 0.01)
@@ -31,10 +21,10 @@ def single_clip_pose(corner, angle):
 @pytest.mark.parametrize("angle", [0.3, 2.1, 5.9])
 def test_lower_body_is_of_one_clip_and_upper_body_blends_the_others(angle):
     for r, upper in ((0.01, IN_RED), (R[0], IN_RED), (R[1], IN_BLUE), (0.1, IN_BLUE)):
-        pose = MAP.pose(stylus(r, angle, 0.05))
+        pose = COMPOSITE.pose(stylus(r, angle, 0.05))
         np.testing.assert_allclose(difference(pose, single_clip_pose(IN_LOWER, angle))[:12], 0.0, atol=1e-9)
         np.testing.assert_allclose(difference(pose, single_clip_pose(upper, angle))[12:], 0.0, atol=1e-9)
-    middle = MAP.pose(stylus(0.05, angle, 0.0))
+    middle = COMPOSITE.pose(stylus(0.05, angle, 0.0))
     to_red, to_blue = (
         np.linalg.norm(difference(middle, single_clip_pose(end, angle))[12:]) for end in (IN_RED, IN_BLUE)
     )
@@ -44,14 +34,14 @@ def test_lower_body_is_of_one_clip_and_upper_body_blends_the_others(angle):
 
 @pytest.mark.parametrize("angle", [0.3, 2.1, 5.9])
 def test_share_of_other_arms_scales_their_difference(angle):
-    none, some = MAP.with_share(0.0), MAP.with_share(0.25)
+    none, some = COMPOSITE.with_share(0.0), COMPOSITE.with_share(0.25)
     lower, red = single_clip_pose(IN_LOWER, angle), single_clip_pose(IN_RED, angle)
     np.testing.assert_allclose(difference(none.pose(stylus(0.05, angle, 0.0)), lower), 0.0, atol=1e-9)
     part = difference(some.pose(stylus(R[0], angle, 0.0)), lower)[12:]
     assert np.linalg.norm(part) == pytest.approx(0.25 * np.linalg.norm(difference(red, lower)[12:]), rel=0.15)
-    assert (MAP.remarks, len(some.remarks)) == ((), 1)
+    assert (COMPOSITE.remarks, len(some.remarks)) == ((), 1)
     with pytest.raises(ParameterError, match="from 0 to 1"):
-        MAP.with_share(-0.1)
+        COMPOSITE.with_share(-0.1)
 
 
 @pytest.mark.parametrize(

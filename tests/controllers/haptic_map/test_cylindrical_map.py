@@ -20,24 +20,10 @@ from tests.controllers.clips_for_maps import (
     stylus,
     swinging,
 )
+from tests.controllers.example_maps import CLIPS, CORNERS, CYLINDRICAL, CYLINDRICAL_ARMS, R, Z
 from tests.derivatives import central_differences
 
-R, Z = (0.03, 0.07), (-0.03, 0.03)
-CORNERS = [(R[0], Z[0]), (R[1], Z[0]), (R[0], Z[1]), (R[1], Z[1])]
-CLIPS = [(swinging(1, 120), 30.0), (swinging(2, 90), 30.0), (swinging(3, 150), 60.0), (swinging(4, 120), 30.0)]
 STILL = Cylindrical(CLIPS, R, Z)
-MOVING = Cylindrical(
-    [
-        (swinging(1, travel=1.3), 30.0),
-        (swinging(2, travel=0.7), 30.0),
-        (swinging(3, turns=1.0), 30.0),
-        (swinging(4, travel=0.5, turns=-0.1), 30.0),
-    ],
-    R,
-    Z,
-    [LEG],
-)
-ARMS = Cylindrical(CLIPS, R, Z, legs=LegsOfOneClip(2, (3,))).with_share(0.5)
 
 
 def test_corner_plays_its_clip():
@@ -122,7 +108,7 @@ def test_lap_at_own_pace_is_that_of_the_legs_and_others_count_only_if_they_are_b
     np.testing.assert_allclose(arms.with_share(0.0).lap_durations, durations[2:3])
 
 
-@pytest.mark.parametrize("haptic_map", [STILL, ARMS], ids=["all joints", "arms only"])
+@pytest.mark.parametrize("haptic_map", [STILL, CYLINDRICAL_ARMS], ids=["all joints", "arms only"])
 def test_share_out_of_range_or_without_legs_of_one_clip_raises_parameter_error(haptic_map):
     with pytest.raises(ParameterError, match="share of other joints from 0 to 1"):
         haptic_map.with_share(1.1 if haptic_map.legs else 0.5)
@@ -177,10 +163,10 @@ def test_pose_does_not_depend_on_the_stylus_orientation():
 
 @pytest.mark.parametrize("position", [(0.03, -0.03), (0.05, 0.0), (0.06, 0.02), (0.03, 0.03)])
 def test_pose_velocity_and_acceleration_are_continuous_over_the_seam(position):
-    memory, step, poses = MOVING.compiled().memory, 2e-3, []
+    memory, step, poses = CYLINDRICAL.compiled().memory, 2e-3, []
     for k in range(-40, 41):
         # The seam lies between two samples, as at a servo's ticks.
-        poses.append(MOVING.pose(stylus(position[0], (k + 0.4) * step, position[1]), memory))
+        poses.append(CYLINDRICAL.pose(stylus(position[0], (k + 0.4) * step, position[1]), memory))
     velocity = np.array([difference(b, a) for a, b in pairwise(poses)]) / step
     change = np.abs(np.diff(velocity, axis=0)).max(axis=1)
     assert memory[LAPS] == 1.0
@@ -190,9 +176,9 @@ def test_pose_velocity_and_acceleration_are_continuous_over_the_seam(position):
 
 
 def test_lap_there_and_back_returns_to_the_same_pose():
-    memory = MOVING.compiled().memory
+    memory = CYLINDRICAL.compiled().memory
     path = np.concatenate([np.linspace(0.1, 15.0, 400), np.linspace(15.0, 0.1, 400)])
-    poses = [MOVING.pose(stylus(0.045, angle, 0.012), memory) for angle in path]
+    poses = [CYLINDRICAL.pose(stylus(0.045, angle, 0.012), memory) for angle in path]
     assert np.linalg.norm(np.subtract(poses[399], poses[0])[:2]) > 0.05
     moved = difference(poses[-1], poses[0])
     np.testing.assert_allclose(moved[2:], 0.0, atol=1e-8)  # places of held feet are sums of steps
@@ -209,10 +195,10 @@ def test_memory_has_no_effect_for_clips_without_drift():
 
 
 def test_walk_advances_by_its_stride_each_lap():
-    memory = MOVING.compiled().memory
-    start = MOVING.pose(stylus(*_at(0, 0.3)), memory)
+    memory = CYLINDRICAL.compiled().memory
+    start = CYLINDRICAL.pose(stylus(*_at(0, 0.3)), memory)
     for s in np.linspace(0.3, 3.3, 200):
-        end = MOVING.pose(stylus(*_at(0, s)), memory)
+        end = CYLINDRICAL.pose(stylus(*_at(0, s)), memory)
     assert np.linalg.norm(end[:2] - start[:2]) == pytest.approx(3 * 1.3, abs=1e-6)
     np.testing.assert_allclose(difference(end, start)[2:], 0.0, atol=1e-9)
 
@@ -232,7 +218,7 @@ def test_mean_rotation_is_the_dominant_eigenvector():
 @given(st.tuples(*[st.floats(-10.0, 10.0)] * 3))
 def test_pose_is_finite_with_unit_quaternions_everywhere(p):
     x = np.array([*p, 1.0, 0.0, 0.0, 0.0])
-    for h_map in (STILL, MOVING):
+    for h_map in (STILL, CYLINDRICAL):
         pose = h_map.pose(x)
         assert np.isfinite(h_map.jacobian(x)).all()
         np.testing.assert_allclose(np.linalg.norm(pose[3:].reshape(-1, 4), axis=1), 1.0, atol=1e-12)

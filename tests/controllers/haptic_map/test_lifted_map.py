@@ -6,41 +6,18 @@ import pytest
 from controllers.errors import ParameterError
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.frames import closing_gap, frames_at, interpolate_frames, lap_spline, packed_frames
-from tests.controllers.clips_for_maps import LEG, difference, stylus, swinging
-
-ROWS = 48
-TURN = 2.0 * np.pi
-
-
-def ring(m, radius=0.012, centre=(0.05, 0.0)):
-    """Sites of m curves that wind round a circle of the half plane, shape (rows, m, 2)."""
-    lap = np.arange(ROWS)[:, None] * TURN / ROWS
-    around = np.arange(m) * TURN / m + 0.3 * np.sin(lap)
-    size = radius * (1.0 + 0.15 * np.cos(2.0 * lap))
-    return np.stack([centre[0] + size * np.cos(around), centre[1] + size * np.sin(around)], axis=-1)
-
-
-def angles_once_round(frames, start=0.0, span=TURN, unevenness=0.25):
-    """Angles of frames: increasing, at an uneven pace."""
-    s = np.linspace(0.0, 1.0, frames)
-    return start + span * (s + unevenness * np.sin(TURN * s) / TURN)
-
-
-# A walk, a clip on the spot, a turn, and an open part of a clip.
-CLIPS = [
-    (swinging(1, 120, travel=1.3), 30.0),
-    (swinging(2, 90), 25.0),
-    (swinging(3, 150, turns=1.0), 60.0),
-    (swinging(6, 200)[:140], 30.0),
-]
-CLOSED = [True, True, True, False]
-ANGLES = [
-    angles_once_round(121),
-    angles_once_round(91, 1.2),
-    angles_once_round(151, 4.0),
-    angles_once_round(140, 0.3, TURN - 0.9),
-]
-MAP = Lifted(CLIPS, CLOSED, ANGLES, ring(4), [LEG], ("walk", "still", "turn", "cut"))
+from tests.controllers.clips_for_maps import LEG, difference, stylus
+from tests.controllers.example_maps import (
+    ANGLES,
+    ARM_JOINTS,
+    CLOSED,
+    LIFTED,
+    LIFTED_CLIPS,
+    TURN,
+    WITHOUT_LIMBS,
+    angles_once_round,
+    ring,
+)
 
 
 def worst_at_frames(lifted):
@@ -55,12 +32,12 @@ def worst_at_frames(lifted):
 
 
 def test_every_frame_of_every_clip_is_exact_on_its_curve():
-    assert worst_at_frames(MAP) < 1e-9
+    assert worst_at_frames(LIFTED) < 1e-9
 
 
 @pytest.mark.parametrize("i", range(4))
 def test_frames_at_many_angles_are_identical_to_the_kernel(i):
-    clip = MAP._placed_clips[i]
+    clip = LIFTED._placed_clips[i]
     spline = lap_spline(clip.angles, clip.remainder, 4, clip.closed)
     angles = np.concatenate([np.linspace(0.0, TURN, 200), np.mod(spline[0], TURN), [np.nextafter(TURN, 0.0)]])
     packed, value, slope = packed_frames([spline]), *np.empty((2, clip.poses.shape[1]))
@@ -70,8 +47,8 @@ def test_frames_at_many_angles_are_identical_to_the_kernel(i):
 
 
 def test_clips_are_displaced_rigidly_over_the_ground():
-    for i, (poses, _) in enumerate(CLIPS):
-        placed = MAP.placed(i)
+    for i, (poses, _) in enumerate(LIFTED_CLIPS):
+        placed = LIFTED.placed(i)
         np.testing.assert_array_equal(placed[:, 2], poses[:, 2])
         np.testing.assert_allclose(np.abs(placed[:, 7:]), np.abs(poses[:, 7:]), atol=1e-15)
         steps = [np.linalg.norm(np.diff(p[:, :2], axis=0), axis=1) for p in (placed, poses)]
@@ -100,7 +77,7 @@ def test_clips_are_displaced_rigidly_over_the_ground():
 )
 def test_invalid_arguments_raise_parameter_error(change, message):
     arguments = {
-        "clips": CLIPS, "closed": CLOSED, "angles": ANGLES, "sites": ring(4), "limbs": [LEG],
+        "clips": LIFTED_CLIPS, "closed": CLOSED, "angles": ANGLES, "sites": ring(4), "limbs": [LEG],
         "names": ("walk", "still", "turn", "cut"),
     }  # fmt: skip
     with pytest.raises(ParameterError, match=message):
@@ -108,53 +85,56 @@ def test_invalid_arguments_raise_parameter_error(change, message):
 
 
 def test_closed_clip_with_a_gap_raises_parameter_error():
-    poses = CLIPS[3][0]
+    poses = LIFTED_CLIPS[3][0]
     assert closing_gap(poses) > 0.1
     with pytest.raises(ParameterError, match=r"clip 0 is to be closed, but its last frame is 0\.\d+ from its first"):
         Lifted([(poses, 30.0)], [True], [angles_once_round(140)], ring(1))
 
 
-MAP_WITHOUT_LIMBS = Lifted(CLIPS, CLOSED, ANGLES, ring(4), (), ("walk", "still", "turn", "cut"))
-ARMS = [2, 3]
 """The joints of the map without limbs that are left to all clips."""
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4, 0.0])
 def test_legs_are_of_one_clip_and_arms_have_their_share_of_the_others(share):
     owner, rng = 1, np.random.default_rng(5)
-    owned = MAP_WITHOUT_LIMBS.with_legs_of(owner, ARMS, share)
+    owned = WITHOUT_LIMBS.with_legs_of(owner, ARM_JOINTS, share)
     for r, angle, z in rng.uniform([0.03, 0.1, -0.02], [0.07, 6.2, 0.02], (60, 3)):
-        x, own = stylus(r, angle, z), MAP_WITHOUT_LIMBS.site(owner, np.array(angle))
-        alone = MAP_WITHOUT_LIMBS.pose(stylus(own[0], angle, own[1]))
+        x, own = stylus(r, angle, z), WITHOUT_LIMBS.site(owner, np.array(angle))
+        alone = WITHOUT_LIMBS.pose(stylus(own[0], angle, own[1]))
         pose = owned.pose(x)
         np.testing.assert_allclose(difference(pose, alone)[:9], 0.0, atol=1e-9)
         # The chordal mean of clips is the dominant eigenvector of their weighted sum of q qᵀ (Markley et al. 2007).
-        weights, moments = share * MAP_WITHOUT_LIMBS.weights(x) + (1.0 - share) * np.eye(4)[owner], np.zeros((2, 4, 4))
+        weights, moments = (
+            share * WITHOUT_LIMBS.weights(x) + (1.0 - share) * np.eye(4)[owner],
+            np.zeros((2, 4, 4)),
+        )
         for i, weight in enumerate(weights):
-            at = MAP_WITHOUT_LIMBS.site(i, np.array(angle))
-            clip = MAP_WITHOUT_LIMBS.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)
+            at = WITHOUT_LIMBS.site(i, np.array(angle))
+            clip = WITHOUT_LIMBS.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)
             moments += weight * clip[:, :, None] * clip[:, None, :]
         mean = np.linalg.eigh(moments)[1][:, :, -1].ravel()
         np.testing.assert_allclose(difference(pose, np.concatenate([pose[:11], mean]))[9:], 0.0, atol=1e-6)
 
 
 def test_with_legs_of_leaves_the_original_map_unchanged():
-    before, x = MAP_WITHOUT_LIMBS.pose(stylus(0.05, 2.0, 0.004)), stylus(0.05, 2.0, 0.004)
-    owned = MAP_WITHOUT_LIMBS.with_legs_of(2, ARMS, 0.5)
+    before, x = WITHOUT_LIMBS.pose(stylus(0.05, 2.0, 0.004)), stylus(0.05, 2.0, 0.004)
+    owned = WITHOUT_LIMBS.with_legs_of(2, ARM_JOINTS, 0.5)
     assert np.abs(difference(owned.pose(x), before)).max() > 0.01
-    np.testing.assert_array_equal(MAP_WITHOUT_LIMBS.pose(x), before)
-    assert (MAP_WITHOUT_LIMBS.remarks, MAP_WITHOUT_LIMBS.legs_of) == ((), None)
+    np.testing.assert_array_equal(WITHOUT_LIMBS.pose(x), before)
+    assert (WITHOUT_LIMBS.remarks, WITHOUT_LIMBS.legs_of) == ((), None)
     assert owned.remarks == (
         "legs and trunk are those of turn wherever the hand is pushed, with 50 % of the others' arm motion",
     )
 
 
-@pytest.mark.parametrize(("clip", "upper", "share"), [(4, ARMS, 1.0), (0, [4], 1.0), (0, [0], 1.0), (0, ARMS, 1.5)])
+@pytest.mark.parametrize(
+    ("clip", "upper", "share"), [(4, ARM_JOINTS, 1.0), (0, [4], 1.0), (0, [0], 1.0), (0, ARM_JOINTS, 1.5)]
+)
 def test_invalid_legs_raise_parameter_error(clip, upper, share):
     with pytest.raises(ParameterError, match="a lifted map takes the legs of clip 0 to 3"):
-        MAP_WITHOUT_LIMBS.with_legs_of(clip, upper, share)
+        WITHOUT_LIMBS.with_legs_of(clip, upper, share)
 
 
 def test_joints_of_a_limb_cannot_be_left_to_other_clips():
     with pytest.raises(ParameterError, match="no limb's"):
-        MAP.with_legs_of(0, [2], 1.0)
+        LIFTED.with_legs_of(0, [2], 1.0)

@@ -2,20 +2,23 @@
 
 import numpy as np
 import pytest
-from test_composite_map import MAP_WITH_LEGS as COMPOSITE
-from test_cylindrical_map import ARMS as CYLINDRICAL_ARMS
-from test_cylindrical_map import MOVING as CYLINDRICAL
-from test_lifted_map import ARMS, MAP_WITHOUT_LIMBS
-from test_lifted_map import MAP as LIFTED
 
 from controllers.haptic_map.lifting.sites import box
 from tests.controllers.clips_for_maps import assert_same_compiled, difference, stylus
+from tests.controllers.example_maps import (
+    ARM_JOINTS,
+    COMPOSITE_WITH_LEGS,
+    CYLINDRICAL,
+    CYLINDRICAL_ARMS,
+    LIFTED,
+    WITHOUT_LIMBS,
+)
 from tests.derivatives import extrapolated_differences
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-LEGS_OF_ONE = MAP_WITHOUT_LIMBS.with_legs_of(1, ARMS, 0.6)
+LEGS_OF_ONE = WITHOUT_LIMBS.with_legs_of(1, ARM_JOINTS, 0.6)
 MAPS = {
-    "cylindrical": CYLINDRICAL, "cylindrical, legs of one clip": CYLINDRICAL_ARMS, "composite": COMPOSITE,
+    "cylindrical": CYLINDRICAL, "cylindrical, legs of one clip": CYLINDRICAL_ARMS, "composite": COMPOSITE_WITH_LEGS,
     "lifted": LIFTED, "lifted, legs of one clip": LEGS_OF_ONE,
 }  # fmt: skip
 

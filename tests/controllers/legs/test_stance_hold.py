@@ -8,7 +8,7 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.legs.stance_hold import advance_hand, carry_root, fresh_footing, hold_stance_foot, mixing_degree
 from controllers.motion.lap import MEMORY
 from tests.controllers.clips_for_maps import LEG, difference, matrices, numeric_jacobian, stylus, swinging, wxyz
-from tests.controllers.haptic_map.test_lifted_map import ring
+from tests.controllers.example_maps import ring
 
 SOLE = LEG.points - LEG.points.mean(axis=0)
 FLAT = -float(SOLE[:, 2].min())  # height of the centre of a sole that lies flat

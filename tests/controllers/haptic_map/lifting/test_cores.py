@@ -7,7 +7,7 @@ from test_lifted_weights import moving_sites
 from controllers.curves.splines import basis, periodic_interpolation
 from controllers.haptic_map.lifting.cores import _MAX_CORE_RADIUS, attract_to_core, core_points
 from tests.controllers.clips_for_maps import stylus
-from tests.controllers.haptic_map.test_lifted_map import MAP
+from tests.controllers.example_maps import LIFTED
 from tests.derivatives import central_differences
 
 TURN = 2.0 * np.pi
@@ -72,12 +72,12 @@ def test_draw_in_moves_near_positions_to_the_site_and_keeps_the_edge():
 def test_hand_one_millimetre_off_its_curve_plays_the_clip():
     for angle in np.linspace(0.1, 6.1, 12):
         for i in range(4):
-            r, z = MAP.site(i, np.array(angle))
+            r, z = LIFTED.site(i, np.array(angle))
             for direction in np.linspace(0.0, TURN, 5):
-                w = MAP.weights(stylus(r + 1e-3 * np.cos(direction), angle, z + 1e-3 * np.sin(direction)))
+                w = LIFTED.weights(stylus(r + 1e-3 * np.cos(direction), angle, z + 1e-3 * np.sin(direction)))
                 assert abs(w[i] - 1.0) < 0.01
             # On the curve the Jacobian has no component across it.
-            jacobian = MAP.jacobian(stylus(r, angle, z))
+            jacobian = LIFTED.jacobian(stylus(r, angle, z))
             across = np.array([np.cos(angle), np.sin(angle), 0.0])
             assert np.abs(jacobian[:, :3] @ across).max() < 1e-4 * np.abs(jacobian).max()
             assert np.abs(jacobian[:, 2]).max() < 1e-4 * np.abs(jacobian).max()
