@@ -196,7 +196,7 @@ class Person:
 
     def __post_init__(self) -> None:
         check_kind("name", self.name, str)
-        if not isinstance(self.hand, str) or self.hand not in ("right", "left"):
+        if self.hand not in ("right", "left"):
             raise SimError(f"the hand of person {self.name!r} is {self.hand!r}; expected right or left")
         for option in fields(self):
             if option.name not in INTERVALS:
