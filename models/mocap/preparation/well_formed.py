@@ -131,7 +131,8 @@ class WellFormed:
             f"{'closed' if self.closed else 'open'}, {self.seconds:.2f} s, velocities at the "
             f"{'seam differ by' if self.closed else 'ends'} {self.seam:.2f} rad/s",
             f"{self.outliers} outlier frames; joints {np.rad2deg(max(self.excess, 0.0)):.1f}° beyond their range",
-            f"{self.flights} flight{'' if self.flights == 1 else 's'}, {self.flight_error:.1f} m/s² from gravity; contact leaves a residual of "
+            f"{self.flights} flight{'' if self.flights == 1 else 's'}, {self.flight_error:.1f} m/s² from gravity; "
+            "contact leaves a residual of "
             f"{100 * self.residual:.1f} % of weight; {self.joint} needs {100 * self.strain:.0f} % of its torque limit",
         )
 
