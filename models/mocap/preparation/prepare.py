@@ -56,8 +56,6 @@ class Prepared(NamedTuple):
         How the file was interpreted; None for a file on the figure's own skeleton.
     paced : Paced
         Result of the pace correction.
-    looped : LoopedClip
-        Result of looping, before optimisation.
     root_shift : float
         Largest displacement of the root over the floor that keeps a supporting foot from sliding (`root_path`) [m].
     hands : HandLoad
@@ -68,22 +66,31 @@ class Prepared(NamedTuple):
         Distance of the clip from the capture.
     seconds : float
         Processor time [s].
-    near : bool
-        Whether a feasible motion was found near the capture. If not, as where flights are not ballistic at the file's
-        rate, `clip` is only the looped and low-passed capture, and its measures show the faults.
     """
 
     clip: Clip
     captured: Clip
     report: RetargetReport | None
     paced: Paced
-    looped: LoopedClip
     root_shift: float
     hands: HandLoad
     attempt: Attempt
     fidelity: Fidelity
     seconds: float
-    near: bool
+
+    @property
+    def looped(self) -> LoopedClip:
+        """The capture looped, before optimisation."""
+        return self.attempt.cycle
+
+    @property
+    def near(self) -> bool:
+        """Whether a feasible motion was found near the capture.
+
+        If not, as where flights are not ballistic at the file's rate, `clip` is only the looped and low-passed capture,
+        and its measures show the faults.
+        """
+        return self.attempt.near
 
 
 @on_one_blas_thread
@@ -134,9 +141,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     distance = fidelity(clip, captured, cycle, timed.pace)
     bears = near and tried.schedule.hands.any()
     hands = _hand_load(tried.planted, tried.schedule) if bears else HandLoad(0.0, 0.0)
-    return Prepared(
-        clip, captured, loaded.report, timed, cycle, carried, hands, tried, distance, process_time() - began, near
-    )
+    return Prepared(clip, captured, loaded.report, timed, carried, hands, tried, distance, process_time() - began)
 
 
 def _nearest(path: Path, clip: Clip, loop: str, wraps: bool | None, mirror: bool) -> Attempt:

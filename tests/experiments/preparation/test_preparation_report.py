@@ -92,22 +92,26 @@ def _made(falls: float | None, near: bool) -> Prepared:
     schedule = stances(clip, clip)
     tried = Attempt(looped, clip, schedule, clip, 0.0, RmsChange(0.0, 0.0, 0.0), near)
     return Prepared(
-        clip, clip, None, Paced(clip, 1.0, falls), looped, 0.0, HandLoad(0.0, 0.0),
-        tried, fidelity(clip, clip, looped, 1.0), 0.0, near,
+        clip, clip, None, Paced(clip, 1.0, falls), 0.0, HandLoad(0.0, 0.0),
+        tried, fidelity(clip, clip, looped, 1.0), 0.0,
     )  # fmt: skip
+
+
+def _looped(made: Prepared, looped: LoopedClip) -> Prepared:
+    return made._replace(attempt=made.attempt._replace(cycle=looped))
 
 
 @pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
 def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
     result = _made(falls, near=False)
     looped = result.looped
-    eventful = losses(result._replace(looped=looped._replace(left_out=(1.2, 4.5))))
+    eventful = losses(_looped(result, looped._replace(left_out=(1.2, 4.5))))
     assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful
     lines = losses(result)
     assert any("fall at 0.5 m/s², and would fall freely at" in line for line in lines) == named
     assert "at 1.20 s the capture has turned 90° further than its cycle ever does: --loop open keeps its turns" in lines
     less = looped._replace(lost_turn=LostTurn(0.4, 1.2))
-    assert not any("has turned" in line for line in losses(result._replace(looped=less)))
+    assert not any("has turned" in line for line in losses(_looped(result, less)))
 
 
 @pytest.mark.parametrize(
@@ -121,7 +125,7 @@ def test_turn_of_a_cycle_is_told_with_its_side(degrees, told):
     poses = [PlanarDisplacement(0.0, 0.0, a).moved(p) for a, p in zip(angles, made.clip.poses, strict=True)]
     turning = made._replace(clip=Clip(np.array(poses), made.clip.fps, "turning"))
     assert changes(turning)[0] == f"cycle 0.00 to 2.20 s, whose ends were 0.0° apart{told}: 2.20 s"
-    assert ", turns" not in changes(turning._replace(looped=made.looped._replace(kind="open")))[0]
+    assert ", turns" not in changes(_looped(turning, made.looped._replace(kind="open")))[0]
 
 
 @pytest.mark.parametrize("near", [True, False])
