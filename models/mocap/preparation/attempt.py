@@ -96,17 +96,18 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
         schedule = with_feet_at_rest(stances(planted, calm), planted)
         result = feasible(calm, schedule, fps=fps, overlap=overlap)
         change = _rms_change(_shifted(start, shift), result.clip)
-        alike = (
+        near = (
             change.turned < _MAX_ROTATION_CHANGE
             and change.raised < _MAX_HEIGHT_CHANGE
+            and result.residual < MAX_RESIDUAL_IN_FLIGHTS
             and _range_excess(result.clip) < max(_range_excess(captured), 0.0) + _MAX_ADDED_EXCESS
         )
-        near = alike and result.residual < MAX_RESIDUAL_IN_FLIGHTS
         excess = _contact_excess(result.clip)
-        if last is not None and ((last.near and not near) or np.all(excess > _MIN_IMPROVEMENT * before)):
+        if last is not None and (not near or np.all(excess > _MIN_IMPROVEMENT * before)):
             break
         last = Attempt(cycle, _shifted(cycle.clip, shift), schedule, result.clip, result.residual, change, near)
-        if not alike or (near and np.all(excess <= 1.0)):
+        # From a motion that is not near, passes lead away: a roll floated over the floor, 27° from the capture, and fell.
+        if not near or np.all(excess <= 1.0):
             break
         clip, before = result.clip, excess
     assert last is not None

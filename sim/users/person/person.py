@@ -196,6 +196,7 @@ class Person:
 
     def __post_init__(self) -> None:
         check_kind("name", self.name, str)
+        check_kind("hand", self.hand, str)
         if self.hand not in ("right", "left"):
             raise SimError(f"the hand of person {self.name!r} is {self.hand!r}; expected right or left")
         for option in fields(self):

@@ -65,6 +65,7 @@ def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None
         (lambda: hvf.certify(SIM, delay=3.0), "the delay of a loop must be at most 128 periods of 0.001 s, got 3.0 s"),
         (lambda: hvf.load(None), "path is None; expected text or Path"),  # pyright: ignore
         (lambda: hvf.clips("walk", 3), "name is 3; expected text or Path"),  # pyright: ignore
+        (lambda: hvf.Person(hand=np.ones(2)), "hand is array([1., 1.]); expected text"),  # pyright: ignore
         (lambda: hvf.Push(10**400, 1.0, 1.0), "expected a number"),
         (lambda: hvf.Study.load(3), "path is 3; expected text or Path"),  # pyright: ignore
         (lambda: hvf.law(3), "a law is made from a function law(hand, …); got 3"),  # pyright: ignore

@@ -66,10 +66,10 @@ def test_pass_that_improves_no_measure_of_contact_does_not_count(monkeypatch: py
     assert made.residual == 0.01
 
 
-def test_large_residual_is_lowered_by_another_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motion_that_is_not_feasible_is_not_pursued(monkeypatch: pytest.MonkeyPatch) -> None:
     made, given = attempted(monkeypatch, [0.2, 0.03], [2.0, 0.9])
-    assert len(given) == 2
-    assert (made.near, made.residual) == (True, 0.03)
+    assert len(given) == 1
+    assert (made.near, made.residual) == (False, 0.2)
 
 
 def test_motion_unlike_the_capture_ends_the_attempt(monkeypatch: pytest.MonkeyPatch) -> None:
