@@ -106,7 +106,7 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
         if last is not None and (not near or np.all(excess > _MIN_IMPROVEMENT * before)):
             break
         last = Attempt(cycle, _shifted(cycle.clip, shift), schedule, result.clip, result.residual, change, near)
-        # From a motion that is not near, passes lead away: a roll floated over the floor, 27° from the capture, and fell.
+        # From a motion that is not near, passes lead away: a roll floated over the floor, 27° from the capture.
         if not near or np.all(excess <= 1.0):
             break
         clip, before = result.clip, excess
