@@ -102,7 +102,7 @@ def run_delayed(
 
 
 @dataclass(frozen=True)
-class Trial:
+class LoopTrial:
     """A randomly drawn trial.
 
     Attributes
@@ -144,7 +144,7 @@ class Trial:
         return Arm(self.hand.stiffness, self.hand.damping, path)
 
 
-def draw_trial(rng: np.random.Generator) -> Trial:
+def draw_trial(rng: np.random.Generator) -> LoopTrial:
     """A random trial: curve, phase, clock, hand, and a damping of 5 to 70 % of the largest stable one."""
     while True:
         radius, centre = rng.uniform(0.02, 0.06), rng.uniform([-0.06, -0.08, -0.06], [0.06, 0.08, 0.1])
@@ -168,7 +168,7 @@ def draw_trial(rng: np.random.Generator) -> Trial:
         tangent = curve.velocity(phase) / np.linalg.norm(curve.velocity(phase))
         sideways = rng.normal(size=3)
         sideways -= tangent * (tangent @ sideways)
-        trial = Trial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
+        trial = LoopTrial(curve, phase, 0.0, sampling, hand, sideways / np.linalg.norm(sideways))
         return replace(trial, b_d=float(rng.uniform(0.05, 0.7)) * _max_stable_damping(trial.loop()))
 
 
@@ -227,7 +227,7 @@ FULL_CONDITIONS = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, rounded
 """The conditions of a run: the world's own integrator, quantised encoders and Coulomb friction."""
 
 
-def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
+def simulate(trial: LoopTrial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None) -> Array:
     """Displacement across the curve from the trial's place at each tick [m], shape (n, 3); see `hand_path`."""
     tangent = trial.curve.velocity(trial.phase) / np.linalg.norm(trial.curve.velocity(trial.phase))
     displacement = hand_path(trial, k_r, ticks, conditions, state) - trial.curve.point(trial.phase)
@@ -235,7 +235,12 @@ def simulate(trial: Trial, k_r: float, ticks: int, conditions: Conditions, state
 
 
 def hand_path(
-    trial: Trial, k_r: float, ticks: int, conditions: Conditions, state: Array | None = None, user: Arm | None = None
+    trial: LoopTrial,
+    k_r: float,
+    ticks: int,
+    conditions: Conditions,
+    state: Array | None = None,
+    user: Arm | None = None,
 ) -> Array:
     """Position of the hand in H at each tick [m], shape (n, 3), n ≤ ticks, after a release beside the curve.
 

@@ -14,8 +14,9 @@ from controllers.haptic_map.lifting.arrangement_energy import PUSH_SPEED
 from controllers.haptic_map.river_clips import RiverClips
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
+from experiments.fitting.animation_trial import FPS, AnimationTrial
 from experiments.fitting.figure_legs import packed_legs
-from experiments.fitting.verdict import FPS, TRIAL_SECONDS, Trial
+from experiments.preparation.followed import TRIAL_SECONDS
 from geometry.arrays import Array
 from geometry.easing import cubic_steps, smooth_steps
 from models.mocap.motion.clip import Clip
@@ -152,11 +153,14 @@ def tour_remarks(haptic_map: RiverClips, names: Sequence[str], part: Figure, fig
         Model of the figure alone.
     """
     made_of = (haptic_map.compiled().params, np.array([part.smoothing, part.blend]))
-    verdict = Trial(__name__, lambda: tour_of_rivers(haptic_map, part, figure), _RIVERS_DURATION, made_of).verdict()
-    if verdict.acceptable:
+    trial = AnimationTrial(__name__, lambda: tour_of_rivers(haptic_map, part, figure), _RIVERS_DURATION, made_of)
+    result = trial.followed()
+    if result.stands:
         return ()
-    stop = min(int(verdict.fell // _DWELL_TIME), len(_ORDER) - 1) if verdict.falls else 0
-    change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"
-    after = f", {verdict.fell - _DWELL_TIME * stop:.1f} s after {change}"
-    where = after if stop else ", before any river changes" if verdict.falls else ""
-    return (f"from river to river the physical figure {verdict}{where}",)
+    where = ""
+    if result.fell is not None:
+        stop = min(int(result.fell // _DWELL_TIME), len(_ORDER) - 1)
+        change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"
+        after = f", {result.fell - _DWELL_TIME * stop:.1f} s after {change}"
+        where = after if stop else ", before any river changes"
+    return (f"from river to river the physical figure {result}{where}",)

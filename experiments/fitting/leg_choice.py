@@ -24,6 +24,7 @@ from controllers.curves.trajectory import Trajectory
 from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
+from experiments.fitting.animation_trial import AnimationTrial
 from experiments.fitting.hand_tours import (
     domain,
     lap_left_alone,
@@ -31,7 +32,7 @@ from experiments.fitting.hand_tours import (
     tour_duration,
     tour_of_domain,
 )
-from experiments.fitting.verdict import TRIAL_SECONDS, Trial, Verdict
+from experiments.preparation.followed import TRIAL_SECONDS, Followed
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 
 _SHARES = (1.0, 0.5, 0.25, 0.0)  # λ of `with_share`, in the order in which they are tried
@@ -45,35 +46,36 @@ _SAFE_RESIDUAL = MAX_RESIDUAL_IN_FLIGHTS * 5 / 6
 # [body weights] Residual by which a smaller share of the arms has to be better: of 14 sets of captures that are pushed
 # off lifted curves four would give up half or more of the arms for less. Half the value halves the arms in two of them.
 _LEAST_GAIN = 0.005
+_NOTHING_FOUND = Followed(np.inf, 0.0)  # worse than every trial
 
 Carrying = TypeVar("Carrying", Cylindrical, Composite)
 
 
-def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> Trial:
+def trial_of(haptic_map: Cylindrical | Composite, lap: float, parallel: bool) -> AnimationTrial:
     """The trial in which the physical figure follows a map about a circle for 20 s, or two laps if that is longer."""
     made_of = (haptic_map.compiled().params, np.array([lap, parallel, *domain(haptic_map).ravel()]))
-    return Trial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), tour_duration(lap), made_of)
+    return AnimationTrial(__name__, lambda: tour_of_domain(haptic_map, lap, parallel), tour_duration(lap), made_of)
 
 
 def stands_left_alone(haptic_map: Cylindrical | Composite, lap: float) -> bool:
     """Whether the physical figure follows a map well enough while the hand is not pushed; needs compiled code."""
     made_of = (haptic_map.compiled().params, np.array([lap, *domain(haptic_map).ravel()]))
-    trial = Trial(__name__, lambda: lap_left_alone(haptic_map, lap), tour_duration(lap), made_of)
-    return trial.verdict().acceptable
+    trial = AnimationTrial(__name__, lambda: lap_left_alone(haptic_map, lap), tour_duration(lap), made_of)
+    return trial.followed().stands
 
 
 def single_clip_remarks(haptic_map: Cylindrical, name: str, lap: float, parallel: bool) -> tuple[str, ...]:
     """Remark on a map of one clip that the physical figure does not follow well enough; needs compiled code."""
-    verdict = trial_of(haptic_map, lap, parallel).verdict()
-    if verdict.acceptable:
+    result = trial_of(haptic_map, lap, parallel).followed()
+    if result.stands:
         return ()
-    return (_remark(verdict, f"{name} at this lap", stands_left_alone(haptic_map, lap)),)
+    return (_remark(result, f"{name} at this lap", stands_left_alone(haptic_map, lap)),)
 
 
-def _remark(verdict: Verdict, what: str, stands: bool) -> str:
+def _remark(result: Followed, what: str, stands: bool) -> str:
     """Remark on a map that is not followed well enough by a hand that pushes; `stands`: it is without pushes."""
     when, otherwise = ("pushed, ", "; left alone it stands") if stands else ("", "")
-    return f"{when}the physical figure {verdict} with {what}{otherwise}"
+    return f"{when}the physical figure {result} with {what}{otherwise}"
 
 
 def select_legs(
@@ -98,29 +100,29 @@ def select_legs(
     def has_sound_legs(i: int) -> bool:
         return trial_of(map_with_legs(i).with_share(0.0), lap, parallel).is_sound()
 
-    best, name, best_verdict = map_with_legs(0), names[0], Verdict(np.inf, 0.0)
+    best, name, best_result = map_with_legs(0), names[0], _NOTHING_FOUND
     for soundness in (True, False):
         for share in _SHARES:
-            least_gain = _LEAST_GAIN * best_verdict.acceptable
+            least_gain = _LEAST_GAIN * best_result.stands
             for i in (i for i in range(len(names)) if has_sound_legs(i) is soundness):
                 haptic_map = map_with_legs(i).with_share(share)
-                verdict = trial_of(haptic_map, lap, parallel).verdict()
-                if verdict.acceptable and verdict.residual <= _GOOD_RESIDUAL:
+                result = trial_of(haptic_map, lap, parallel).followed()
+                if result.stands and result.residual <= _GOOD_RESIDUAL:
                     return haptic_map, ()
-                if verdict.is_better(best_verdict, least_gain):
-                    best, name, best_verdict, least_gain = haptic_map, names[i], verdict, 0.0
-            if best_verdict.acceptable and (best_verdict.residual <= _SAFE_RESIDUAL or share <= _LEAST_SHARE):
+                if result.is_better(best_result, least_gain):
+                    best, name, best_result, least_gain = haptic_map, names[i], result, 0.0
+            if best_result.stands and (best_result.residual <= _SAFE_RESIDUAL or share <= _LEAST_SHARE):
                 return best, ()
     found = f"the legs of {name}, the best found at this lap"
     if stands_left_alone(best, lap):
-        return best, (_remark(best_verdict, found, stands=True),)
-    for share in (1.0, 0.0) if best_verdict.falls else ():
+        return best, (_remark(best_result, found, stands=True),)
+    for share in (1.0, 0.0) if best_result.fell is not None else ():
         for i in sorted(range(len(names)), key=has_sound_legs, reverse=True):
             haptic_map = map_with_legs(i).with_share(share)
             if stands_left_alone(haptic_map, lap):
-                verdict = trial_of(haptic_map, lap, parallel).verdict()
-                return haptic_map, (_remark(verdict, f"the legs of {names[i]}", stands=True),)
-    return best, (_remark(best_verdict, found, stands=False),)
+                result = trial_of(haptic_map, lap, parallel).followed()
+                return haptic_map, (_remark(result, f"the legs of {names[i]}", stands=True),)
+    return best, (_remark(best_result, found, stands=False),)
 
 
 def followed_map(
@@ -142,24 +144,24 @@ def followed_map(
         Whether the field keeps the pace of a hand that is pushed off (`Follow.parallel`).
     """
 
-    def trial_of(part: Lifted) -> Trial:
+    def trial_of(part: Lifted) -> AnimationTrial:
         made_of = part.compiled().params, np.asarray(curve.times), np.asarray(curve.positions), np.array([keeps_pace])
-        return Trial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), TRIAL_SECONDS, made_of)
+        return AnimationTrial(__name__, lambda: tour_along_curve(part, curve, keeps_pace), TRIAL_SECONDS, made_of)
 
-    whole = trial_of(haptic_map).verdict()
+    whole = trial_of(haptic_map).followed()
     # Pushes come once a lap: a stance in which the feet skate is one in every lap.
-    sound = not whole.acceptable or trial_of(haptic_map).is_sound(in_every_stance=True)
-    if whole.acceptable and sound:
+    sound = not whole.stands or trial_of(haptic_map).is_sound(in_every_stance=True)
+    if whole.stands and sound:
         return haptic_map, ()
-    best, best_verdict = (haptic_map, whole) if sound else (haptic_map, Verdict(np.inf, 0.0))
+    best, best_result = (haptic_map, whole) if sound else (haptic_map, _NOTHING_FOUND)
     for share in _SHARES:
         part = haptic_map.with_legs_of(clip, arms, share)
-        verdict = trial_of(part).verdict()
-        least_gain = _LEAST_GAIN * best_verdict.acceptable
-        if verdict.is_better(best_verdict, least_gain):
-            best, best_verdict = part, verdict
-        if best_verdict.acceptable and best_verdict.residual <= _GOOD_RESIDUAL:
+        result = trial_of(part).followed()
+        least_gain = _LEAST_GAIN * best_result.stands
+        if result.is_better(best_result, least_gain):
+            best, best_result = part, result
+        if best_result.stands and best_result.residual <= _GOOD_RESIDUAL:
             break
     fault = f"the physical figure {whole}" if sound else "the animation's feet skate or sink, or joints go too far,"
     remark = f"pushed off its curve to those beside it, {fault} with the whole map"
-    return best, (remark if best_verdict.acceptable else f"{remark}, and {best_verdict} with the best part of it",)
+    return best, (remark if best_result.stands else f"{remark}, and {best_result} with the best part of it",)

@@ -14,7 +14,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.hand_tours import domain, poses_about_circle
-from experiments.fitting.verdict import MAX_FOOT_SKATE, MotionFaults, motion_faults
+from experiments.fitting.motion_faults import MAX_FOOT_SKATE, MotionFaults, motion_faults
 from geometry.arrays import Array
 from models.humanoid.skeleton import BODIES
 

@@ -14,7 +14,7 @@ from experiments.files.given_path import given_path
 from experiments.files.made_folder import made_folder
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import not_blendable
-from experiments.fitting.verdict import MAX_JOINT_EXCESS, MAX_PENETRATION
+from experiments.fitting.motion_faults import MAX_JOINT_EXCESS, MAX_PENETRATION
 from experiments.lifting.lift import LiftedClips, lift_clips
 from experiments.lifting.map_quality import MapQuality, MotionMeasure, measure_map
 from sim.errors import SimError

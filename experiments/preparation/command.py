@@ -5,8 +5,9 @@ from pathlib import Path
 from controllers.checks import check_kind
 from experiments.files.given_path import given_path
 from experiments.flights.ballistics import clip_ballistics, clip_flights
+from experiments.preparation.followed import TRIAL_SECONDS
 from experiments.preparation.prepared_file import Measured, PreparedFile, doubts
-from experiments.preparation.tracking_trial import TRIAL_SECONDS, followed
+from experiments.preparation.tracking_trial import followed
 from experiments.results.measures.soles import Soles
 from geometry.whole_files import write_text
 from models.mocap.library import check_target, writing

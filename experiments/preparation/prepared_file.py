@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from experiments.flights.ballistics import ClipBallistics
-from experiments.preparation.tracking_trial import Followed
+from experiments.preparation.followed import Followed
 from geometry import quaternions
 from geometry.physics import GRAVITY
 from models.mocap.motion.clip import Clip

@@ -15,7 +15,14 @@ from controllers.certificates.loop.stability import CertifiedRiver, stability
 from controllers.curves.closest_point import closest_phases
 from controllers.curves.trajectory import Trajectory
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import FULL_CONDITIONS, LAP_DURATION, Conditions, Trial, draw_trial, hand_path
+from experiments.certify.trial_simulation import (
+    FULL_CONDITIONS,
+    LAP_DURATION,
+    Conditions,
+    LoopTrial,
+    draw_trial,
+    hand_path,
+)
 from experiments.studies.trial_onset import predicted
 from sim.errors import SimError
 
@@ -80,7 +87,7 @@ def release(drawn: Certified, conditions: Conditions, rng: np.random.Generator) 
     river, device, clock = drawn.river, drawn.river.device, drawn.river.sampling
     hand = HandImpedance(*(float(rng.uniform(*getattr(drawn.hands, n))) for n in ("mass", "damping", "stiffness")))
     phase = float(rng.uniform(0.0, LAP_DURATION))
-    trial = Trial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
+    trial = LoopTrial(drawn.still, phase, river.b_d, clock, hand, np.array([1.0, 0.0, 0.0]))
     loop = trial.loop()
     while True:
         offset, velocity = rng.normal(size=3), rng.normal(size=3)

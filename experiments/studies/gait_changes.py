@@ -20,8 +20,9 @@ from scipy.signal import lsim
 from controllers.haptic_map.lifted import Lifted
 from controllers.state import stylus_path
 from experiments.files.map_files import load_figure_map
-from experiments.fitting.verdict import FPS
-from experiments.preparation.tracking_trial import Followed, followed
+from experiments.fitting.animation_trial import FPS
+from experiments.preparation.followed import Followed
+from experiments.preparation.tracking_trial import followed
 from experiments.setups.modes.lifted_runs import CROSS_RATE, EASE_TIME, curve_number
 from geometry.arrays import Array
 from geometry.easing import smooth_steps

@@ -23,7 +23,7 @@ from controllers.walking.gait import Gait
 from controllers.walking.walked_path import STEP
 from controllers.walking.walking import Walking
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial
+from experiments.certify.trial_simulation import LAP_DURATION, Conditions, LoopTrial
 from experiments.setups.parts.leading_hand import s_curve
 from experiments.studies.trial_onset import observed, predicted
 from sim.users.hand.arm import Arm
@@ -35,7 +35,7 @@ _GAIT = Gait(1.4, 1.25, np.array([2, 2]), 0.45)
 
 
 @dataclass(frozen=True)
-class LeadingTrial(Trial):
+class LeadingTrial(LoopTrial):
     """A trial of LEADING, whose stiffness is k_l with k_z in proportion.
 
     Attributes

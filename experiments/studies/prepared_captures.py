@@ -6,10 +6,12 @@ a row per file as it is completed.
 
 import sys
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
 from experiments.flights.ballistics import clip_flights
+from experiments.preparation.followed import Followed
 from experiments.preparation.source_deviation import deviations
 from experiments.preparation.tracking_trial import followed
 from experiments.studies.random_sets import JUDGING, TUNING
@@ -31,7 +33,9 @@ TABLE_HEADER = (
 def row(path: Path, result: Prepared) -> str:
     """A line of the table."""
     was, now = (well_formed(clip, clip_flights(clip)) for clip in (result.captured, result.clip))
-    before, after = followed(result.captured), followed(result.clip)
+    before, began = followed(result.captured), process_time()
+    after = followed(result.clip)
+    cost = (process_time() - began) / after.seconds
     tried, kept, seconds = result.attempt, result.fidelity, result.clip.duration
     most, directions, places = kept.extremes[0], *_source_deviations(path, result)
     motion_is_near = result.near and tried.residual <= MAX_RESIDUAL_IN_FLIGHTS / 2
@@ -40,8 +44,8 @@ def row(path: Path, result: Prepared) -> str:
         _file_name(path),
         _half_name(path),
         f"{result.looped.kind} {seconds:.2f} s" + (f", {result.paced.pace:.2f}×" if result.paced.pace != 1.0 else ""),
-        f"{before}",
-        f"{after}" + ("" if result.near else " *"),
+        _followed_text(before),
+        _followed_text(after) + ("" if result.near else " *"),
         why,
         f"{100 * tried.residual:.1f}",
         directions,
@@ -56,7 +60,7 @@ def row(path: Path, result: Prepared) -> str:
         f"{100 * was.strain:.0f} → {100 * now.strain:.0f} {now.joint}",
         f"{np.rad2deg(kept.joints):.1f}°, {100 * kept.root:.1f} cm",
         f"{most.joint} {np.rad2deg(most.angle):.0f}°",
-        f"{result.seconds:.1f}, {result.seconds / seconds:.1f}, {result.seconds / (seconds * after.cost):.0f}",
+        f"{result.seconds:.1f}, {result.seconds / seconds:.1f}, {result.seconds / (seconds * cost):.0f}",
     )
     return "| " + " | ".join(cells) + " |"
 
@@ -80,6 +84,10 @@ def _source_deviations(path: Path, result: Prepared) -> tuple[str, str]:
         f"{np.rad2deg(was.direction):.1f} → {np.rad2deg(now.direction):.1f} {now.segment}",
         f"{100 * was.place:.1f} → {100 * now.place:.1f} {now.joint}",
     )
+
+
+def _followed_text(result: Followed) -> str:
+    return f"{100 * result.residual:.1f}" + ("" if result.fell is None else f" [{result.fell:.1f} s]")
 
 
 def _flights_text(measures: WellFormed) -> str:

@@ -23,7 +23,7 @@ from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
 from experiments.fitting.blendable import best_lap, closed_loops, not_blendable, off_pace, timing_clip
-from experiments.fitting.verdict import motion_faults
+from experiments.fitting.motion_faults import motion_faults
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
@@ -80,7 +80,7 @@ def captured(folder: str, name: str) -> tuple[Captured, Clip | None]:
         clip = replace(prepared_clips([Path(folder) / name])[0].clip, name=name)
     except ModelError as error:
         return Captured(name, f"refused: {error}", np.inf, None), None
-    residual, fell, *_ = followed(clip)
+    residual, fell, _ = followed(clip)
     # Against a clip at rest is tested whether a clip can be blended at all.
     reason = "; ".join(not_blendable((clip, Clip(np.repeat(clip.poses[:1], 2, axis=0), clip.fps, "rest"))))
     if not reason and (fell is not None or residual > MAX_SOLO_RESIDUAL):

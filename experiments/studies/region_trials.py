@@ -19,7 +19,7 @@ from controllers.certificates.report import Verdict
 from controllers.curves.closest_point import closest_phases
 from controllers.safety.limiter import ForceLimiter
 from experiments.certify.certify import certified_rivers
-from experiments.certify.trial_simulation import FULL_CONDITIONS, Trial, hand_path
+from experiments.certify.trial_simulation import FULL_CONDITIONS, LoopTrial, hand_path
 from experiments.config.run_config import RunConfig
 from geometry.arrays import Array
 
@@ -79,7 +79,7 @@ def simulate_from(
     rate = np.linalg.solve(jacobian, pace + size * direction)
     off = theta - np.array(device.angles(curve.point(phase)))
     state = np.concatenate([off, rate, off - river.sampling.period * rate, rate])
-    trial = Trial(curve, phase, river.b_d, river.sampling, hand, away / max(np.linalg.norm(away), 1e-12))
+    trial = LoopTrial(curve, phase, river.b_d, river.sampling, hand, away / max(np.linalg.norm(away), 1e-12))
     path = hand_path(trial, river.k_r, TICKS, FULL_CONDITIONS, state)
     if len(path) < TICKS:
         return Outcome(np.inf, np.inf)

@@ -16,7 +16,7 @@ import tyro
 from matplotlib.figure import Figure
 
 from controllers.certificates.loop.stability import slowest_mode
-from experiments.certify.trial_simulation import Conditions, Trial, draw_trial
+from experiments.certify.trial_simulation import Conditions, LoopTrial, draw_trial
 from experiments.files.figure_files import save_figure
 from experiments.studies.trial_onset import observed, observed_with_friction, predicted, with_friction
 from geometry.whole_files import write_text
@@ -62,14 +62,14 @@ class Row:
     rounded_observed: float
 
 
-def oscillation_amplitude(trial: Trial, k_r: float) -> float:
+def oscillation_amplitude(trial: LoopTrial, k_r: float) -> float:
     """Amplitude [m] at which the river commands 3 N, which the motors can give anywhere, but at most 1 mm."""
     loop = trial.loop()
     mode = slowest_mode(loop, k_r, trial.b_d, 0, swings=True)[1]
     return min(1e-3, 3.0 / float(np.linalg.norm(loop.force(k_r, trial.b_d)[0] @ mode)))
 
 
-def run_trial(trial: Trial) -> Row:
+def run_trial(trial: LoopTrial) -> Row:
     """Predict and observe one trial under all conditions."""
     expected = predicted(trial)
     amplitude = oscillation_amplitude(trial, expected)

@@ -10,13 +10,13 @@ from scipy.optimize import brentq
 from controllers.certificates.loop.sampled_loop import SampledLoop
 from controllers.certificates.loop.stability import critical_stiffness, slowest_mode
 from experiments.certify.certified_device import phantom_device
-from experiments.certify.trial_simulation import Conditions, Trial, simulate
+from experiments.certify.trial_simulation import Conditions, LoopTrial, simulate
 from geometry.arrays import Array
 
 MAX_GROWTH = 20.0  # ratio to the initial distance beyond which a motion is no longer taken to be linear
 
 
-def predicted(trial: Trial) -> float:
+def predicted(trial: LoopTrial) -> float:
     """Critical k_r [N/m] of the linear loop."""
     return float(critical_stiffness(trial.loop(), trial.b_d)[0])
 
@@ -45,7 +45,7 @@ def growth(path: Array) -> float:
     return float(np.abs(modes[sizes > 1e-4 * sizes.max()]).max() ** (1.0 / stride))
 
 
-def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
+def observed_growth(trial: LoopTrial, k_r: float, conditions: Conditions) -> float:
     """Rate at which the slowest mode grows [1/s], from a simulation of up to 0.2 s."""
     period = trial.sampling.period
     path = simulate(trial, k_r, int(np.clip(0.2 / period, 120, 500)), conditions)
@@ -57,7 +57,7 @@ def observed_growth(trial: Trial, k_r: float, conditions: Conditions) -> float:
     return float(np.log(growth(np.diff(path[end // 4 : end], axis=0)))) / period
 
 
-def observed(trial: Trial, guess: float, conditions: Conditions) -> float:
+def observed(trial: LoopTrial, guess: float, conditions: Conditions) -> float:
     """Critical k_r [N/m] of the simulation, between half and twice a guess; NaN if the onset is not in this range."""
 
     def rate(log_k: float) -> float:
@@ -82,7 +82,7 @@ class FrictionOnset(NamedTuple):
     loop: SampledLoop
 
 
-def with_friction(trial: Trial, amplitude: float) -> FrictionOnset:
+def with_friction(trial: LoopTrial, amplitude: float) -> FrictionOnset:
     """Onset predicted with Coulomb friction, for a motion of a given amplitude across the curve [m].
 
     Describing function: friction f_c on a joint that oscillates with rate amplitude Ω is equivalent to the damping
@@ -99,7 +99,7 @@ def with_friction(trial: Trial, amplitude: float) -> FrictionOnset:
     return FrictionOnset(k_r, loop)
 
 
-def observed_with_friction(trial: Trial, guess: FrictionOnset, amplitude: float, conditions: Conditions) -> float:
+def observed_with_friction(trial: LoopTrial, guess: FrictionOnset, amplitude: float, conditions: Conditions) -> float:
     """Critical k_r [N/m] of the simulation for a motion of a given amplitude [m], which neither grows nor decays.
 
     Each simulation begins in the slowest mode at that amplitude; its first two oscillations are compared.

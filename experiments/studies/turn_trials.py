@@ -33,7 +33,7 @@ _RATE_FACTOR = 1.35  # multiple of the certified rate at which certified clips a
 _SETTLING_TIME = 0.1  # [s] of rest before the motion, in which the contact settles
 
 
-class Followed(NamedTuple):
+class TurnOutcome(NamedTuple):
     """How the mass followed a path.
 
     Attributes
@@ -64,7 +64,7 @@ def _body_model(friction: float) -> mujoco.MjModel:
         </body></body></worldbody><actuator>{motors}</actuator></mujoco>""")
 
 
-def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed:
+def follow(way: Array, fps: float, velocity: Array, friction: float) -> TurnOutcome:
     """Let the mass follow a path from its first point, with an initial velocity.
 
     Parameters
@@ -102,7 +102,7 @@ def follow(way: Array, fps: float, velocity: Array, friction: float) -> Followed
             push(began + spline(t) - _centre_of_mass(data.qpos), speed(t) - _centre_of_mass(data.qvel), acceleration(t))
         miss = max(miss, float(np.linalg.norm(began + way[k] - way[0] - _centre_of_mass(data.qpos))))
         slid = max(slid, float(np.linalg.norm(data.qpos[:2] - start)))
-    return Followed(miss, slid)
+    return TurnOutcome(miss, slid)
 
 
 def _centre_of_mass(values: Array) -> Array:
@@ -129,7 +129,7 @@ class TurnTrial(NamedTuple):
     miss_of_mean: float
 
 
-def parabola(acceleration: Array, seconds: float, friction: float, rate: float) -> Followed:
+def parabola(acceleration: Array, seconds: float, friction: float, rate: float) -> TurnOutcome:
     """Let the mass follow a constant acceleration [m/s²] for `seconds` [s], played at a rate."""
     fps = 100.0 * rate / seconds
     t = np.arange(101.0)[:, None] / fps

@@ -19,7 +19,7 @@ from controllers.fields.follow import Follow
 from controllers.fields.governor import Governor
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.stretchy_tubes import StretchyTubes
-from experiments.certify.trial_simulation import LAP_DURATION, Conditions, Trial, simulate
+from experiments.certify.trial_simulation import LAP_DURATION, Conditions, LoopTrial, simulate
 from experiments.cli import main
 from models.mocap.library import embedded
 from tests.controllers.rivers_for_certificates import CIRCLE, river
@@ -48,7 +48,7 @@ def test_command_refutes_a_run_that_oscillates(tmp_path):
 
 
 @dataclass(frozen=True)
-class LawTrial(Trial):
+class LawTrial(LoopTrial):
     """A trial with any law."""
 
     law: Law

@@ -8,18 +8,18 @@ import pytest
 
 from controllers.haptic_map.cylindrical import Cylindrical, LegsOfOneClip
 from experiments.fitting import hand_tours, leg_choice
+from experiments.fitting.animation_trial import AnimationTrial
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.hand_tours import tour_of_domain
 from experiments.fitting.leg_choice import select_legs, trial_of
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import Trial, Verdict
+from experiments.preparation.followed import Followed
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
 
 R, Z, LAP = (0.0227, 0.0727), (-0.025, 0.025), 4.4
 LEGS = figure_legs(figure_model())
 NAMES = ("run", "walk", "cheer", "angry")
-NEVER = np.inf
 
 
 @pytest.fixture(scope="module")
@@ -28,33 +28,33 @@ def maps() -> list[Cylindrical]:
     return [Cylindrical(motions, R, Z, LEGS, None, LAP, LegsOfOneClip(owner, arms(LEGS))) for owner in range(4)]
 
 
-def set_verdicts(
-    monkeypatch: pytest.MonkeyPatch, verdicts: dict[tuple[int, float], Verdict], fit: set[int],
+def set_results(
+    monkeypatch: pytest.MonkeyPatch, results: dict[tuple[int, float], Followed], fit: set[int],
     alone: Sequence[tuple[int, float]] = (),
 ) -> list[object]:  # fmt: skip
-    """Replace trials by verdicts per (clip of the legs, share of other arms); the list of trials.
+    """Replace trials by results per (clip of the legs, share of other arms); the list of trials.
 
     `alone` are those that stand while the hand is left alone.
     """
     trials: list[object] = []
 
-    def verdict(trial: Trial) -> Verdict:
+    def followed(trial: AnimationTrial) -> Followed:
         haptic_map = cast(Cylindrical, trial.show())
         trials.append((haptic_map.legs_of, haptic_map.share))
-        return verdicts.get((haptic_map.legs_of, haptic_map.share), Verdict(0.5, 1.0))
+        return results.get((haptic_map.legs_of, haptic_map.share), Followed(0.5, 1.0))
 
     monkeypatch.setattr(leg_choice, "tour_of_domain", lambda haptic_map, *_: haptic_map)
     monkeypatch.setattr(
         leg_choice, "stands_left_alone", lambda haptic_map, _: (haptic_map.legs_of, haptic_map.share) in alone
     )
-    monkeypatch.setattr(Trial, "verdict", verdict)
-    monkeypatch.setattr(Trial, "is_sound", lambda trial: trial.show().legs_of in fit)
+    monkeypatch.setattr(AnimationTrial, "followed", followed)
+    monkeypatch.setattr(AnimationTrial, "is_sound", lambda trial: trial.show().legs_of in fit)
     return trials
 
 
 def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.05, NEVER), (3, 1.0): Verdict(0.01, NEVER)}
-    trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
+    results = {(0, 1.0): Followed(0.01, 3.0), (1, 1.0): Followed(0.05), (3, 1.0): Followed(0.01)}
+    trials = set_results(monkeypatch, results, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (1, 1.0, ())
     assert trials == [(0, 1.0), (1, 1.0)]
@@ -63,8 +63,8 @@ def test_first_well_bearing_legs_are_chosen(maps: list[Cylindrical], monkeypatch
 def test_legs_with_least_residual_are_chosen_if_none_bear_well(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, 3.0), (1, 1.0): Verdict(0.11, NEVER), (3, 1.0): Verdict(0.08, NEVER)}
-    trials = set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
+    results = {(0, 1.0): Followed(0.01, 3.0), (1, 1.0): Followed(0.11), (3, 1.0): Followed(0.08)}
+    trials = set_results(monkeypatch, results, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (3, 1.0, ())
     assert trials == [(owner, 1.0) for owner in range(4)]
@@ -73,7 +73,7 @@ def test_legs_with_least_residual_are_chosen_if_none_bear_well(
 def test_arm_share_is_reduced_if_no_legs_bear_all_of_it(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    set_verdicts(monkeypatch, {(1, 1.0): Verdict(0.2, NEVER), (2, 0.25): Verdict(0.08, NEVER)}, {0, 1, 2, 3})
+    set_results(monkeypatch, {(1, 1.0): Followed(0.2), (2, 0.25): Followed(0.08)}, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (2, 0.25, ())
 
@@ -83,8 +83,8 @@ def test_arm_share_is_reduced_near_the_bound_if_that_gains_something_but_not_to_
     half: float, chosen: tuple[int, float], maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of hands that push a map with 11.5 % in the trial, one in five makes the figure fall."""
-    verdicts = {(1, 1.0): Verdict(0.115, NEVER), (2, 0.5): Verdict(half, NEVER), (1, 0.0): Verdict(0.02, NEVER)}
-    set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3})
+    results = {(1, 1.0): Followed(0.115), (2, 0.5): Followed(half), (1, 0.0): Followed(0.02)}
+    set_results(monkeypatch, results, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share, remarks) == (*chosen, ())
 
@@ -92,21 +92,21 @@ def test_arm_share_is_reduced_near_the_bound_if_that_gains_something_but_not_to_
 def test_sliding_legs_are_chosen_only_as_a_last_resort(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    verdicts = {(0, 1.0): Verdict(0.01, NEVER), (1, 0.0): Verdict(0.06, NEVER)}
-    set_verdicts(monkeypatch, verdicts, {1, 2, 3})
+    results = {(0, 1.0): Followed(0.01), (1, 0.0): Followed(0.06)}
+    set_results(monkeypatch, results, {1, 2, 3})
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 1
-    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.01, NEVER)}, {1, 2, 3})
+    set_results(monkeypatch, {(0, 1.0): Followed(0.01)}, {1, 2, 3})
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
 def test_unbearable_map_is_reported_with_the_best_legs(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    set_verdicts(monkeypatch, {(2, 0.5): Verdict(0.4, 9.0)}, {0, 1, 2, 3})
+    set_results(monkeypatch, {(2, 0.5): Followed(0.4, 9.0)}, {0, 1, 2, 3})
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (2, 0.5)
     assert remarks == ("the physical figure falls at 9.0 s with the legs of cheer, the best found at this lap",)
-    set_verdicts(monkeypatch, {(1, 0.0): Verdict(0.14, NEVER)}, set())
+    set_results(monkeypatch, {(1, 0.0): Followed(0.14)}, set())
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[1][0].startswith(
         "the physical figure has a residual of 14 % of weight with the legs of walk"
     )
@@ -116,12 +116,12 @@ def test_legs_that_stand_while_the_hand_is_left_alone_are_chosen_if_all_fall_whe
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A hopscotch at 1.7 times its pace fell later in a push than a jog at its own, which stands without pushes."""
-    verdicts = {(0, 1.0): Verdict(0.3, 5.5), (1, 1.0): Verdict(0.2, 4.8), (1, 0.0): Verdict(0.1, 4.7)}
-    set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3}, alone=[(1, 0.0), (2, 0.0)])
+    results = {(0, 1.0): Followed(0.3, 5.5), (1, 1.0): Followed(0.2, 4.8), (1, 0.0): Followed(0.1, 4.7)}
+    set_results(monkeypatch, results, {0, 1, 2, 3}, alone=[(1, 0.0), (2, 0.0)])
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (1, 0.0)
     assert remarks == ("pushed, the physical figure falls at 4.7 s with the legs of walk; left alone it stands",)
-    set_verdicts(monkeypatch, verdicts, {0, 1, 2, 3}, alone=[(0, 1.0), (1, 0.0)])
+    set_results(monkeypatch, results, {0, 1, 2, 3}, alone=[(0, 1.0), (1, 0.0)])
     best, remarks = select_legs(maps.__getitem__, NAMES, LAP, False)
     assert (best.legs_of, best.share) == (0, 1.0)
     assert remarks[0].endswith("with the legs of run, the best found at this lap; left alone it stands")
@@ -130,7 +130,7 @@ def test_legs_that_stand_while_the_hand_is_left_alone_are_chosen_if_all_fall_whe
 def test_legs_that_no_push_fells_are_kept_though_others_need_less_when_the_hand_is_left_alone(
     maps: list[Cylindrical], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    set_verdicts(monkeypatch, {(0, 1.0): Verdict(0.14, NEVER)}, {0, 1, 2, 3}, alone=[(1, 1.0)])
+    set_results(monkeypatch, {(0, 1.0): Followed(0.14)}, {0, 1, 2, 3}, alone=[(1, 1.0)])
     assert select_legs(maps.__getitem__, NAMES, LAP, False)[0].legs_of == 0
 
 
@@ -182,7 +182,7 @@ def test_trial_takes_two_laps(lap: float, seconds: float, maps: list[Cylindrical
 @pytest.mark.slow
 def test_walk_bears_arms_that_make_a_run_fall(maps: list[Cylindrical]) -> None:
     assert trial_of(maps[1], LAP, False).is_sound()
-    walk, run = trial_of(maps[1], LAP, False).verdict(), trial_of(maps[0], LAP, False).verdict()
-    assert walk.acceptable
+    walk, run = trial_of(maps[1], LAP, False).followed(), trial_of(maps[0], LAP, False).followed()
+    assert walk.stands
     assert walk.is_better(run, 0.0)
-    assert not run.acceptable
+    assert not run.stands

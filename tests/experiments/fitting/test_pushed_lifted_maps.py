@@ -11,11 +11,13 @@ from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting import hand_tours, leg_choice, verdict
+from experiments.fitting import animation_trial, hand_tours, leg_choice
+from experiments.fitting.animation_trial import AnimationTrial
 from experiments.fitting.hand_tours import tour_along_curve
+from experiments.fitting.motion_faults import MotionFaults
 from experiments.fitting.similarity import arms
-from experiments.fitting.verdict import MotionFaults, Trial, Verdict
 from experiments.lifting.lift import lift_clips
+from experiments.preparation.followed import Followed
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.motion.clip import Clip, pose_difference
@@ -66,55 +68,55 @@ def test_push_along_a_curve_whose_radius_changes_speeds_the_hand_up_or_slows_it_
     assert kept == pytest.approx(np.arange(60) / 120.0, abs=1e-6)
 
 
-FALLS, LACKS = Verdict(0.2, 3.0), Verdict(0.2, np.inf)
+FALLS, LACKS = Followed(0.2, 3.0), Followed(0.2)
 WHOLE_MAP_REMARK = "pushed off its curve to those beside it, the physical figure {} with the whole map"
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "legs", "share", "expected"),
+    ("results", "legs", "share", "expected"),
     [
-        ({"whole": Verdict(0.11, np.inf)}, None, 1.0, ()),
+        ({"whole": Followed(0.11)}, None, 1.0, ()),
         (
-            {"whole": LACKS, 1.0: Verdict(0.07, np.inf), 0.5: Verdict(0.068, np.inf), 0.25: Verdict(0.069, np.inf),
-             0.0: Verdict(0.069, np.inf)},
+            {"whole": LACKS, 1.0: Followed(0.07), 0.5: Followed(0.068), 0.25: Followed(0.069),
+             0.0: Followed(0.069)},
             1, 1.0, (WHOLE_MAP_REMARK.format("has a residual of 20 % of weight"),),
         ),
-        ({"whole": FALLS, 1.0: Verdict(0.05, np.inf)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
+        ({"whole": FALLS, 1.0: Followed(0.05)}, 1, 1.0, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),)),
         (
-            {"whole": LACKS, 1.0: Verdict(0.1, np.inf), 0.5: Verdict(0.06, np.inf)},
+            {"whole": LACKS, 1.0: Followed(0.1), 0.5: Followed(0.06)},
             1, 0.5, (WHOLE_MAP_REMARK.format("has a residual of 20 % of weight"),),
         ),
         (
-            {"whole": FALLS, 1.0: Verdict(0.09, np.inf), 0.5: Verdict(0.08, np.inf), 0.25: Verdict(0.1, np.inf),
-             0.0: Verdict(0.1, np.inf)},
+            {"whole": FALLS, 1.0: Followed(0.09), 0.5: Followed(0.08), 0.25: Followed(0.1),
+             0.0: Followed(0.1)},
             1, 0.5, (WHOLE_MAP_REMARK.format("falls at 3.0 s"),),
         ),
         (
-            {"whole": FALLS, 1.0: Verdict(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
+            {"whole": FALLS, 1.0: Followed(0.3, 2.0), 0.5: LACKS, 0.25: FALLS, 0.0: LACKS},
             1, 0.5, (f"{WHOLE_MAP_REMARK.format('falls at 3.0 s')}, and has a residual of 20 % of weight "
                      "with the best part of it",),
         ),
     ],
 )  # fmt: skip
 def test_figure_keeps_own_legs_and_the_largest_bearable_arm_share(
-    verdicts: dict[str | float, Verdict], legs: int | None, share: float, expected: tuple[str, ...], lifted: Lifted,
+    results: dict[str | float, Followed], legs: int | None, share: float, expected: tuple[str, ...], lifted: Lifted,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    def tried(trial: Trial) -> Verdict:
+    def tried(trial: AnimationTrial) -> Followed:
         part = cast(Lifted, trial.show())
-        return verdicts["whole" if part.legs_of is None else part.share]
+        return results["whole" if part.legs_of is None else part.share]
 
     monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(Trial, "verdict", tried)
-    monkeypatch.setattr(Trial, "is_sound", lambda *_, **__: True)
+    monkeypatch.setattr(AnimationTrial, "followed", tried)
+    monkeypatch.setattr(AnimationTrial, "is_sound", lambda *_, **__: True)
     part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share, remarks) == (legs, share, expected)
 
 
 def test_figure_keeps_own_legs_if_whole_map_skates(lifted: Lifted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(leg_choice, "tour_along_curve", lambda part, curve, keeps_pace: part)
-    monkeypatch.setattr(Trial, "verdict", lambda *_: Verdict(0.01, np.inf))
-    monkeypatch.setattr(Trial, "is_sound", lambda *_, **__: False)
+    monkeypatch.setattr(AnimationTrial, "followed", lambda *_: Followed(0.01))
+    monkeypatch.setattr(AnimationTrial, "is_sound", lambda *_, **__: False)
     part, remarks = leg_choice.followed_map(lifted, lifted.curve(1), 1, arms(lifted.limbs), True)
     assert (part.legs_of, part.share) == (1, 1.0)
     assert "feet skate" in remarks[0]
@@ -141,7 +143,7 @@ def test_curve_of_lifted_map_has_the_duration_of_its_clip(lifted: Lifted, tmp_pa
 def test_one_stance_of_many_in_which_a_push_drags_a_foot_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pushes come once a lap; the measure of a map's animation otherwise leaves out a twentieth of the stances."""
     still = Clip(np.repeat(rest_pose()[None], 4, axis=0), 120.0, "still")
-    monkeypatch.setattr(verdict, "motion_faults", lambda *_: MotionFaults(0.0, 0.0, 0.01, 0.06))
-    trial = Trial(__name__, lambda: still, 1.0, (np.random.default_rng().random(8),))
+    monkeypatch.setattr(animation_trial, "motion_faults", lambda *_: MotionFaults(0.0, 0.0, 0.01, 0.06))
+    trial = AnimationTrial(__name__, lambda: still, 1.0, (np.random.default_rng().random(8),))
     assert trial.is_sound()
     assert not trial.is_sound(in_every_stance=True)

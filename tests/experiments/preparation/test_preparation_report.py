@@ -7,8 +7,8 @@ import pytest
 
 from experiments.flights.ballistics import clip_ballistics, clip_flights
 from experiments.preparation.command import foot_slide
+from experiments.preparation.followed import Followed
 from experiments.preparation.prepared_file import PreparedFile, changes, doubts, losses
-from experiments.preparation.tracking_trial import Followed
 from geometry.physics import GRAVITY
 from models.mocap.library import embedded, embedded_names
 from models.mocap.motion.clip import Clip, PlanarDisplacement
@@ -136,7 +136,7 @@ def test_lines_are_in_the_order_of_importance(near):
     bent = replace(sound, excess=0.1, bent="left_knee", strain=1.2)
     faulty = replace(bent, residual=0.2, skate=0.02, depth=0.03, highest=0.02)
     far = result.fidelity._replace(joints=0.2)
-    falls = Followed(0.1, 2.5, 20.0, 1.0)
+    falls = Followed(0.1, 2.5)
     outcome = PreparedFile(result._replace(fidelity=far), faulty, falls, 0.05, ("flight at 1 s",), ())
     first, *below = str(outcome).splitlines()
     assert first.startswith(f"{result.clip.name}: not well-formed; ")
@@ -154,7 +154,7 @@ def test_lines_are_in_the_order_of_importance(near):
 
 def test_a_well_formed_clip_has_one_line_and_what_it_lacks():
     result = _made(None, near=True)
-    outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01, None, 20.0, 1.0), 0.01, (), ())
+    outcome = PreparedFile(result, well_formed(result.clip, ()), Followed(0.01), 0.01, (), ())
     first, lost = str(outcome).splitlines()
     assert first.startswith(f"{result.clip.name}: well-formed; ")
     assert lost.endswith(": --loop open keeps its turns")

@@ -10,8 +10,8 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from experiments.cli import main
 from experiments.config.options import run_config
 from experiments.config.run_config import RunConfig
+from experiments.fitting.motion_faults import motion_faults
 from experiments.fitting.similarity import faults_at
-from experiments.fitting.verdict import motion_faults
 from experiments.setups.wiring import wire
 from experiments.trials.trial.measures import TrialLog
 from models.mocap.library import embedded

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from experiments.config.options import run_config
-from experiments.fitting.verdict import Trial, Verdict
+from experiments.fitting.animation_trial import AnimationTrial
+from experiments.preparation.followed import Followed
 from experiments.setups.setups import map_parts
 from models.humanoid.skeleton import figure_model
 from models.mocap.library import embedded
@@ -22,7 +23,7 @@ def test_single_clip_off_its_pace_is_tried_and_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The run has flights; 2.2 s and 1.47 s are whole numbers of its strides, 1.8 s is off both by 20 %."""
-    monkeypatch.setattr(Trial, "verdict", lambda _: Verdict(0.2, 1.5))
+    monkeypatch.setattr(AnimationTrial, "followed", lambda _: Followed(0.2, 1.5))
     own = embedded("run").duration
     for lap, remarks in ((own, ()), (1.8, ("the physical figure falls at 1.5 s with run at this lap",))):
         parts = map_parts(run_config(clips=("run",) * 4, lap=lap, seconds=1.0), figure_model())

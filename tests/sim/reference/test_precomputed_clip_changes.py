@@ -16,9 +16,10 @@ from controllers.state import stylus_path
 from experiments.config.options import run_config
 from experiments.files import array_cache
 from experiments.fitting import hand_tours, river_changes
+from experiments.fitting.animation_trial import AnimationTrial
 from experiments.fitting.figure_legs import figure_legs, packed_legs
 from experiments.fitting.rest_phases import with_rests
-from experiments.fitting.verdict import Trial, Verdict
+from experiments.preparation.followed import Followed
 from experiments.setups.modes.rivers import river_bundle
 from experiments.setups.parts.clips import load_clips
 from experiments.setups.setups import map_parts
@@ -150,26 +151,26 @@ def test_common_stride_count_of_two_clips_is_found(map_with_offsets: RiverClips)
 
 
 @pytest.mark.parametrize(
-    ("verdict", "remarks"),
+    ("result", "remarks"),
     [
-        (Verdict(0.05, np.inf), ()),
-        (Verdict(0.2, np.inf), ("from river to river the physical figure has a residual of 20 % of weight",)),
+        (Followed(0.05), ()),
+        (Followed(0.2), ("from river to river the physical figure has a residual of 20 % of weight",)),
         (
-            Verdict(0.2, 6.5),
+            Followed(0.2, 6.5),
             (
                 "from river to river the physical figure falls at 6.5 s, "
                 "1.0 s after the change from squat_dance to walk",
             ),
         ),
-        (Verdict(0.2, 2.0), ("from river to river the physical figure falls at 2.0 s, before any river changes",)),
+        (Followed(0.2, 2.0), ("from river to river the physical figure falls at 2.0 s, before any river changes",)),
     ],
 )
 def test_remark_names_the_change_before_a_fall_or_the_missing_support(
-    map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, verdict: Verdict, remarks: tuple[str, ...]
+    map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, result: Followed, remarks: tuple[str, ...]
 ) -> None:
     from experiments.config.run_config import Figure
 
-    monkeypatch.setattr(Trial, "verdict", lambda _: verdict)
+    monkeypatch.setattr(AnimationTrial, "followed", lambda _: result)
     assert hand_tours.tour_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
 
 

@@ -16,7 +16,7 @@ from experiments.certify.trial_simulation import (
     FULL_CONDITIONS,
     LAP_DURATION,
     Conditions,
-    Trial,
+    LoopTrial,
     draw_trial,
     hand_path,
     simulate,
@@ -32,7 +32,7 @@ RIVER = river(b_d=4.0)
 
 
 def _trial(river, phase, hand, direction=(0.0, 0.0, 1.0)):
-    return Trial(STILL, phase * LAP_DURATION / 4.0, river.b_d, river.sampling, hand, np.array(direction))
+    return LoopTrial(STILL, phase * LAP_DURATION / 4.0, river.b_d, river.sampling, hand, np.array(direction))
 
 
 def test_onset_of_instability_is_at_the_predicted_stiffness():
@@ -45,7 +45,7 @@ def test_onset_of_instability_is_at_the_predicted_stiffness():
 
 def test_coulomb_friction_raises_the_onset_as_its_describing_function_predicts():
     sampling = Sampling(1.2e-3, 3.6e-3)
-    trial = Trial(STILL, 0.2 * LAP_DURATION, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
+    trial = LoopTrial(STILL, 0.2 * LAP_DURATION, 2.0, sampling, HandImpedance(0.1, 2.0), np.array([0.0, 0.0, 1.0]))
     friction_onset = with_friction(trial, 1e-3)
     assert friction_onset.k_r > 1.03 * predicted(trial)
     assert observed_with_friction(trial, friction_onset, 1e-3, Conditions(coulomb=True)) == pytest.approx(
@@ -57,7 +57,7 @@ def test_coulomb_friction_raises_the_onset_as_its_describing_function_predicts()
 
 
 def test_integrator_lead_is_half_a_physics_step():
-    trial = Trial(STILL, 0.2 * LAP_DURATION, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    trial = LoopTrial(STILL, 0.2 * LAP_DURATION, 6.0, Sampling(1e-3), HandImpedance(), np.array([0.0, 0.0, 1.0]))
     expected = predicted(trial)
     integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     coarse, fine = (observed(trial, expected, Conditions(steps, integrator)) / expected - 1.0 for steps in (8, 64))
@@ -107,7 +107,7 @@ def test_bounded_force_moves_the_hand_no_farther_than_the_distance_bound():
     push = 1.0
     verdict = energy(RIVER, push, 8.5)
     assert verdict.verdict == "certified"
-    trial = Trial(CIRCLE, 0.5, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    trial = LoopTrial(CIRCLE, 0.5, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
     loop = SampledLoop(RIVER.still(), RIVER.sampling)
     basis, projection = loop.across
     maps, force = loop.frozen(300.0, 4.0)[6], (projection @ loop.push)[6]
@@ -128,7 +128,7 @@ def test_bounded_force_moves_the_hand_no_farther_than_the_distance_bound():
 
 
 def test_relaxed_hand_moves_at_terminal_speed():
-    trial = Trial(CIRCLE, 0.0, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
+    trial = LoopTrial(CIRCLE, 0.0, RIVER.b_d, RIVER.sampling, HandImpedance(), np.array([0.0, 0.0, 1.0]))
     path = hand_path(trial, RIVER.k_r, 750, Conditions(8, coulomb=True))
     phases = np.unwrap(closest_phases(CIRCLE.packed(), path)[0], period=4.0)
     assert len(path) == 750
