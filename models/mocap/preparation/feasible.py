@@ -15,7 +15,7 @@ from geometry.arrays import Array, Mask, rms
 from models.humanoid.skeleton import N_TANGENT
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation.change import DEGREE, Change, NormalEquations
-from models.mocap.preparation.motion_errors import DYNAMIC_COUNT, Errors, MotionErrors
+from models.mocap.preparation.motion_errors import DYNAMIC_COUNT, TORQUE_COUNT, Errors, MotionErrors
 from models.mocap.preparation.stances import Stances
 
 # Iteration ends when the last 3 steps together lower the cost by less than 1 %.
@@ -138,7 +138,9 @@ class _Problem:
         assert errors.jacobian is not None
         jacobian, weighted = errors.jacobian[in_interval], errors.weighted[in_interval]
         basis = np.stack([self.change.basis[order][instants[in_interval]] for order in range(3)], axis=1)
-        dynamic = jacobian[:, :, :DYNAMIC_COUNT]  # only torques and wrench depend on velocity and acceleration
+        # Only torques and wrench depend on velocity and acceleration, and most torques are far within their limits.
+        first = 0 if weighted[:, :TORQUE_COUNT].any() else TORQUE_COUNT
+        dynamic = jacobian[:, :, first:DYNAMIC_COUNT]
         inner = dynamic.transpose(0, 1, 3, 2)[:, :, None] @ dynamic[:, None]
         inner[:, 0, 0] += jacobian[:, 0, DYNAMIC_COUNT:].transpose(0, 2, 1) @ jacobian[:, 0, DYNAMIC_COUNT:]
         pairs = np.einsum("koa,kpb->abkop", basis, basis).reshape((DEGREE + 1) ** 2, -1)

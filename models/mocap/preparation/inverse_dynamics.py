@@ -1,8 +1,4 @@
-"""Inverse dynamics of many states, with derivatives of wrench, torques and positions.
-
-Derivatives by position and velocity are forward differences of the recursive Newton–Euler algorithm (MuJoCo's
-`mj_rne`); the derivative by acceleration is the mass matrix. All are in the tangent of `Clip` poses.
-"""
+"""Inverse dynamics of many states, with derivatives of wrench, torques and places in the tangent of `Clip` poses."""
 
 import mujoco
 import numpy as np
@@ -12,10 +8,8 @@ from geometry.arrays import Array
 from geometry.quaternions import cross_matrix
 from models.humanoid.skeleton import CONTACT_RADIUS, N_TANGENT, figure_model
 from models.mocap.dynamics.floor_forces import RequiredWrench, carriers
+from models.mocap.dynamics.force_derivatives import SegmentPlaces, force_derivatives
 from models.mocap.preparation.change import State
-
-# Steps of the finite differences [rad], [rad/s]: half or twice either changes the derivatives by at most 6e-6 of them.
-_ANGLE_STEP, _RATE_STEP = 1e-5, 1e-4
 
 
 class InverseDynamics:
@@ -51,7 +45,7 @@ class InverseDynamics:
         force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, len(geoms), 3)), np.empty((m, 3))
         anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 3, 3))
         count = m if with_jacobian else 0
-        partials = np.zeros((count, 3, N_TANGENT, N_TANGENT))
+        places = SegmentPlaces.empty(count)
         self.spheres, self.com = np.zeros((count, len(geoms), 3, N_TANGENT)), np.zeros((count, 3, N_TANGENT))
         self.anchors, self.turns = np.zeros((2, count, c, 3, N_TANGENT))
         for k in range(m):
@@ -69,12 +63,15 @@ class InverseDynamics:
             for i, body in enumerate(bodies):
                 mujoco.mj_jac(model, d, self.anchors[k, i], self.turns[k, i], anchors[k, i], body)
             mujoco.mj_jacSubtreeCom(model, d, self.com[k], 1)
-            _differentiate(model, d, force[k], partials[k])
+            for values, of_bodies in zip(places, (d.xpos, d.xipos, d.xmat, d.ximat), strict=True):
+                values[k] = of_bodies[1:].reshape(values[k].shape)
+        force += model.dof_damping * state.v + model.dof_armature * state.a  # which mj_rne leaves out
         arm = com - state.q[:, :3]
         moment = np.einsum("mij,mj->mi", root, force[:, 3:6]) - np.cross(arm, force[:, :3])
         wrench = np.concatenate((force[:, :3], moment), axis=1)
         self.demand = RequiredWrench(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
         if with_jacobian:
+            partials = force_derivatives(model, places, state.v, state.a)
             self._assemble_derivatives(state, partials, force, root, arm)
 
     def _assemble_derivatives(self, state: State, partials: Array, force: Array, root: Array, arm: Array) -> None:
@@ -117,43 +114,3 @@ class InverseDynamics:
             change = -(cross_matrix(force) @ moved).sum(1) + cross_matrix(moment) @ self.turns[states, joint]
             leaning[:, 3 * (body - 1) : 3 * body] = demand.frames[states, joint].transpose(0, 2, 1) @ change
         return leaning
-
-
-def _differentiate(model: mujoco.MjModel, d: mujoco.MjData, force: Array, partials: Array) -> None:
-    """Write the derivatives of generalised forces (57,) by position, velocity and acceleration, shape (3, 57, 57)."""
-    changed_force, full = np.zeros(N_TANGENT), np.empty((N_TANGENT, N_TANGENT))
-    # Looked up once: these loops call them a hundred times for each of some hundred states in an iteration.
-    kinematics = mujoco.mj_kinematics
-    com_position = mujoco.mj_comPos
-    com_velocity = mujoco.mj_comVel
-    inverse = mujoco.mj_rne
-    mujoco.mj_crb(model, d)
-    _write_mass_matrix(model, d, full)
-    partials[2] = full
-    qvel, qpos = d.qvel, d.qpos
-    pose, velocity, moved, step = qpos.copy(), qvel.copy(), np.zeros(model.nq), np.zeros(N_TANGENT)
-    for i in range(3, N_TANGENT):
-        qvel[i] += _RATE_STEP
-        com_velocity(model, d)
-        inverse(model, d, 1, changed_force)
-        qvel[i] = velocity[i]
-        partials[1, :, i] = (changed_force - force) / _RATE_STEP
-    for i in range(3, N_TANGENT):
-        step[i] = _ANGLE_STEP
-        moved[:] = pose
-        mujoco.mj_integratePos(model, moved, step, 1.0)
-        step[i] = 0.0
-        qpos[:] = moved
-        kinematics(model, d)
-        com_position(model, d)
-        com_velocity(model, d)
-        inverse(model, d, 1, changed_force)
-        partials[0, :, i] = (changed_force - force) / _ANGLE_STEP
-
-
-def _write_mass_matrix(model: mujoco.MjModel, data: mujoco.MjData, full: Array) -> None:
-    """Write the mass matrix M to `full`; the signature of mj_fullM differs between versions of MuJoCo."""
-    try:
-        mujoco.mj_fullM(model, data, full)  # pyright: ignore[reportCallIssue, reportArgumentType]
-    except TypeError:
-        mujoco.mj_fullM(model, full, data.qM)  # pyright: ignore[reportCallIssue, reportArgumentType, reportAttributeAccessIssue]

@@ -34,8 +34,8 @@ _STRAIN_THRESHOLD = 0.75  # fraction of the torque limits beyond which torque is
 # later capture exceeds its range by 67° for a moment.
 _LINEAR_EXCESS = 0.05
 _ALL = slice(None)
-_TORQUE_COUNT = 3 * len(JOINTS)
-DYNAMIC_COUNT = _TORQUE_COUNT + 6  # number of the first errors, torques and wrench, that depend on velocities
+TORQUE_COUNT = 3 * len(JOINTS)
+DYNAMIC_COUNT = TORQUE_COUNT + 6  # number of the first errors, torques and wrench, that depend on velocities
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class MotionErrors:
             # Moments of the contact forces change with their lever arms.
             arms[:, 3:] -= quaternions.cross_matrix(forces[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
         wrench_rows[:, 0] -= arms
-        jacobian[:, :, _TORQUE_COUNT:DYNAMIC_COUNT] = scale[:, None, :, None] * np.einsum(
+        jacobian[:, :, TORQUE_COUNT:DYNAMIC_COUNT] = scale[:, None, :, None] * np.einsum(
             "mij,mojn->moin", projection, wrench_rows
         )
         strained = np.flatnonzero(np.any(strain != 0, axis=1))
@@ -222,4 +222,4 @@ class MotionErrors:
             force_response = demand.levers()[strained] @ force_gain[strained]
             torque = dynamics.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
             torque[:, 0] -= dynamics.torque_by_contact_force(forces, strained)
-            jacobian[strained, :, :_TORQUE_COUNT] = gain[:, None, :, None] * torque
+            jacobian[strained, :, :TORQUE_COUNT] = gain[:, None, :, None] * torque

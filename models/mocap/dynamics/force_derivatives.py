@@ -1,0 +1,175 @@
+r"""Derivatives of inverse dynamics in closed form, for many states of the figure at once.
+
+Spatial vectors (Featherstone 2008, Rigid Body Dynamics Algorithms; rotation and moment first) are about a point at rest
+where the root is. With S_i the motions of the coordinates of joint i, V and A a segment's velocity and acceleration,
+gravity subtracted, and F_i, I_i, B_i the sums over the segments that joint i carries of their force, inertia, and
+
+    B u = I (u × V) + u ×* (I V) + V ×* (I u),
+
+a coordinate with the motion W, of the joint between segments p and k, changes τ_i = S_iᵀ F_i by
+
+    S_iᵀ (I_i a + B_i u)               if joint k carries joint i, or is it,
+    S_iᵀ (I_k a + B_k u [+ W ×* F_k])  if joint i carries joint k,
+
+with u = V_p × W, a = A_p × W + V_p × u and the term in brackets by position; u = W, a = (V_k + V_p) × W by velocity;
+u = 0, a = W by acceleration (Carpentier & Mansard 2018, Robotics: Science and Systems XIV; for joints with several
+coordinates Singh, Russell & Wensing 2022, IEEE Robot. Autom. Lett. 7).
+"""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from geometry.arrays import Array
+from geometry.quaternions import cross_matrix
+from models.humanoid.skeleton import N_TANGENT
+
+
+class SegmentPlaces(NamedTuple):
+    """Segments of the figure in m states, in W; the first is the pelvis.
+
+    Attributes
+    ----------
+    joints, centres : arrays, shape (m, 18, 3)
+        Positions of the joints and of the centres of mass [m].
+    frames, principal : arrays, shape (m, 18, 3, 3)
+        Rotations of the segments and of their principal axes of inertia.
+    """
+
+    joints: Array
+    centres: Array
+    frames: Array
+    principal: Array
+
+    @staticmethod
+    def empty(m: int) -> "SegmentPlaces":
+        """Places that are not yet known."""
+        return SegmentPlaces(*(np.empty((m, N_TANGENT // 3 - 1, *shape)) for shape in ((3,), (3,), (3, 3), (3, 3))))
+
+
+def force_derivatives(model: mujoco.MjModel, places: SegmentPlaces, v: Array, a: Array) -> Array:
+    """Derivatives of the generalised forces by position, velocity and acceleration.
+
+    Parameters
+    ----------
+    model : MjModel
+        The figure: a free root, and ball joints at the origins of the other segments.
+    places : SegmentPlaces
+        Of m states.
+    v, a : arrays, shape (m, 57)
+        qvel and qacc. By position, their numbers are constant while the segments' frames, in which they are, rotate.
+
+    Returns
+    -------
+    array, shape (m, 3, 57, 57)
+        [:, o, i, k] of force i by position (o = 0; rotations are in the segments' frames), velocity, acceleration k.
+        The joints' damping and the motors' inertia are included.
+    """
+    motions = _motions(places)
+    segments, outer = _velocities(model, motions, v, a)
+    inertia, cross = _inertias(model, places), _cross(segments.velocity)
+    momentum, dual = inertia @ segments.velocity, -cross.swapaxes(-1, -2)
+    force = inertia @ segments.acceleration + dual @ momentum
+    bias = _force_cross(momentum) - inertia @ cross + dual @ inertia
+    for body in range(model.nbody - 1, 0, -1):
+        for total in (inertia, bias, force):
+            total[:, model.body_parentid[body]] += total[:, body]
+
+    outer_cross = _cross(outer.velocity)
+    shift = outer_cross @ motions
+    changes = (  # u and a by position, velocity, acceleration
+        (shift, _cross(outer.acceleration) @ motions + outer_cross @ shift),
+        (motions, (cross + outer_cross) @ motions),
+        (np.zeros_like(motions), motions),
+    )
+    projections = motions.swapaxes(-1, -2)
+    within = _rows(np.concatenate((projections @ inertia, projections @ bias), axis=-1))
+    carried, carries = _carried(model.body_parentid)
+    derivatives = np.empty((len(v), 3, N_TANGENT, N_TANGENT))
+    for order, (u, change) in enumerate(changes):
+        total = inertia @ change + bias @ u
+        if order == 0:
+            total += _force_cross(force) @ motions
+        of_order = np.matmul(within, _columns(np.concatenate((change, u), axis=-2)), out=derivatives[:, order])
+        of_order *= carried
+        of_order += carries * (_rows(projections) @ _columns(total))
+    derivatives[:, 1] += np.diag(model.dof_damping)
+    derivatives[:, 2] += np.diag(model.dof_armature)
+    return derivatives
+
+
+class _Velocities(NamedTuple):
+    """Velocities, and accelerations with gravity subtracted, of the bodies or of their parents, (m, 19, 6, 1)."""
+
+    velocity: Array
+    acceleration: Array
+
+
+def _velocities(model: mujoco.MjModel, motions: Array, v: Array, a: Array) -> tuple[_Velocities, _Velocities]:
+    """Velocities of the bodies and of their parents; body 0 is the root before it is rotated, and has no mass."""
+    bodies, parents = (_Velocities(*np.zeros((2, len(v), model.nbody, 6, 1))) for _ in range(2))
+    parents.acceleration[:, 0, 3:, 0] = -model.opt.gravity
+    for body, parent in enumerate(model.body_parentid):
+        if body:
+            parents.velocity[:, body] = bodies.velocity[:, parent]
+            parents.acceleration[:, body] = bodies.acceleration[:, parent]
+        rates = np.s_[:, 3 * body : 3 * body + 3, None]
+        moved = motions[:, body] @ v[rates]
+        bodies.velocity[:, body] = parents.velocity[:, body] + moved
+        turned = _cross(bodies.velocity[:, body]) @ moved
+        bodies.acceleration[:, body] = parents.acceleration[:, body] + motions[:, body] @ a[rates] + turned
+    return bodies, parents
+
+
+def _motions(places: SegmentPlaces) -> Array:
+    """S of the bodies, shape (m, 19, 6, 3): displacements of the root, and rotations about the axes of the segments."""
+    m, joints = len(places.joints), places.joints.shape[1]
+    motions = np.zeros((m, 1 + joints, 6, 3))
+    motions[:, 0, 3:] = np.eye(3)
+    motions[:, 1:, :3] = places.frames
+    motions[:, 1:, 3:] = cross_matrix(places.joints - places.joints[:, :1]) @ places.frames
+    return motions
+
+
+def _inertias(model: mujoco.MjModel, places: SegmentPlaces) -> Array:
+    """Spatial inertias of the bodies, shape (m, 19, 6, 6)."""
+    inertia = np.zeros((len(places.joints), model.nbody, 6, 6))
+    mass = model.body_mass[1:, None, None]
+    arm = cross_matrix(places.centres - places.joints[:, :1])
+    own = (places.principal * model.body_inertia[1:, None]) @ places.principal.swapaxes(-1, -2)
+    inertia[:, 1:, :3, :3] = own - mass * arm @ arm
+    inertia[:, 1:, :3, 3:], inertia[:, 1:, 3:, :3] = mass * arm, -mass * arm
+    inertia[:, 1:, 3:, 3:] = mass * np.eye(3)
+    return inertia
+
+
+def _cross(motion: Array) -> Array:
+    """V × of motions (..., 6, 1) on motions, shape (..., 6, 6); −(V ×)ᵀ is V ×* on forces."""
+    turning, moving = cross_matrix(motion[..., :3, 0]), cross_matrix(motion[..., 3:, 0])
+    return np.block([[turning, np.zeros_like(turning)], [moving, turning]])
+
+
+def _force_cross(force: Array) -> Array:
+    """The matrix H of u ×* f = H u of forces (..., 6, 1), shape (..., 6, 6)."""
+    moment, push = cross_matrix(force[..., :3, 0]), cross_matrix(force[..., 3:, 0])
+    return -np.block([[moment, push], [push, np.zeros_like(push)]])
+
+
+def _rows(of_bodies: Array) -> Array:
+    """Rows of the bodies' coordinates (m, 19, 3, n) below each other, shape (m, 57, n)."""
+    return of_bodies.reshape(len(of_bodies), N_TANGENT, -1)
+
+
+def _columns(of_bodies: Array) -> Array:
+    """Columns of the bodies' coordinates (m, 19, n, 3) beside each other, shape (m, n, 57)."""
+    return _rows(of_bodies.swapaxes(-1, -2)).swapaxes(-1, -2)
+
+
+def _carried(parent: Array) -> tuple[Array, Array]:
+    """Whether joint of coordinate k carries that of coordinate i, or is it; whether i's carries k's: both (57, 57)."""
+    within = np.eye(len(parent), dtype=bool)
+    for body in range(1, len(parent)):
+        within[body] |= within[parent[body]]
+    carried = np.kron(within, np.ones((3, 3), dtype=bool))
+    return carried, carried.T & ~carried
