@@ -20,8 +20,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
-from geometry.arrays import Array
+from geometry.arrays import Array, Mask
 from geometry.quaternions import cross_matrix
 from models.humanoid.skeleton import N_TANGENT
 
@@ -166,7 +167,7 @@ def _columns(of_bodies: Array) -> Array:
     return _rows(of_bodies.swapaxes(-1, -2)).swapaxes(-1, -2)
 
 
-def _carried(parent: Array) -> tuple[Array, Array]:
+def _carried(parent: npt.NDArray[np.integer]) -> tuple[Mask, Mask]:
     """Whether joint of coordinate k carries that of coordinate i, or is it; whether i's carries k's: both (57, 57)."""
     within = np.eye(len(parent), dtype=bool)
     for body in range(1, len(parent)):
