@@ -67,6 +67,14 @@ class Repaired(NamedTuple):
     shortened: bool
     joints: tuple[JointJump, ...]
 
+    def since(self, first: int) -> "Repaired":
+        """Without repairs and jumps before a frame."""
+        return self._replace(
+            frames=tuple(k for k in self.frames if k >= first),
+            jumps=tuple(k for k in self.jumps if k >= first),
+            joints=tuple(jump for jump in self.joints if jump.frame >= first),
+        )
+
 
 def repair_frames(motion: SourceMotion, roles: Roles, rest: int | None = None) -> Repaired:
     """Interpolate short gaps whose neighbours agree with each other but not with the frames between.

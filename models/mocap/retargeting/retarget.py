@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
-from geometry.arrays import Array
+from geometry.arrays import Array, Mask
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError
@@ -55,6 +55,7 @@ _PROPPED_REMARK = (
     "for {:.1f} s the body's weight is above neither its feet nor any other low part: what it sits, hangs or leans on "
     "is not in the file, and the figure lacks it, unless feet are missing or the file plays slower than recorded"
 )
+_SLOPE_REMARK = "the floor slopes by {:.1f}°: the motion is turned so that it is level"
 _SITTING_REMARK = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
     "{} cm in height, so that feet that stand stay on the floor"
@@ -74,6 +75,23 @@ class _Frames(NamedTuple):
     dropped: int
 
 
+class _Body(NamedTuple):
+    """The body with the figure's limbs above a level floor.
+
+    `path`, `legs` and `hip_to_ankle` are the middle of the hips, the vectors from hips to ankles, and from the middle
+    of the hips to the ankles, scaled, before the hips are moved in height, at most by `hip_shift`, and the floor's
+    `slope` is levelled.
+    """
+
+    root: Array
+    segments: Array
+    path: Array
+    legs: Array
+    hip_to_ankle: Array
+    hip_shift: float
+    slope: float
+
+
 def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tuple[Clip, RetargetReport]:
     """The motion on the figure, starting above the world's origin and facing +x, and how it was interpreted.
 
@@ -86,47 +104,37 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rest = hints.rest_frame
     _check_channels(motion, rest)
     motion, repeated = without_repeated_frames(motion)
-    motion, broken, jumps, shortened, joint_jumps = repair_frames(motion, roles, rest)
-    motion, noise = without_noise(motion, roles, jumps)
+    repairs = repair_frames(motion, roles, rest)
+    motion, noise = without_noise(repairs.motion, roles, repairs.jumps)
     frames = _frames(motion, roles, rest)
+    repairs = repairs.since(frames.dropped)
     lines, skipped = frames.lines, frames.dropped - frames.first
     check_bones(motion, roles, frames.positions)
-    body = joints_below(roles.segments["pelvis"], motion.parents)
+    positions = frames.positions[:, joints_below(roles.segments["pelvis"], motion.parents)]
     check_biped(motion, lines)
-    up = up_axis(motion, roles, lines, frames.positions[:, body], hints.up)
+    up = up_axis(motion, roles, lines, positions, hints.up)
     check_sides(motion, lines)
     roles = with_abdomen(roles, lines, frames.positions)
     calibrated = _calibrate_body(motion, roles, frames, up.axis, rest)
     axes = _world_axes(calibrated.segments[skipped, 0], up.axis)
-    segments = quaternions.product(axes, with_twist_shared(calibrated.segments[skipped:]))
     figure_leg = _figure_leg_length(not np.isnan(lines.ankles).any())
-    hips, ankles = lines.middle[skipped:], lines.ankles[skipped:]
     scale = figure_leg / lines.leg
-    path = scale * quaternions.rotated(axes, hips - hips[0])
-    legs = scale * quaternions.rotated(axes, ankles - lines.hips[skipped:])
-    hip_to_ankle = scale * quaternions.rotated(axes, ankles - hips[:, None])
-    root = hips_over_feet(path, segments, legs, hip_to_ankle, motion.fps)
-    hip_shift = float(np.ptp(root[:, 2] - path[:, 2]))
-    root, segments, slope = levelled(root, segments, motion.fps)
-    if slope:  # levelling changes the heading of a body that does not face along the slope
-        facing = _world_axes(segments[0, 0], _Z)
-        root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
-    propped = unsupported_time(lines, frames.positions[:, body], up.axis, motion.fps)
-    broken, jumps = ([k for k in indices if k >= frames.dropped] for indices in (broken, jumps))
+    body = _scaled_body(lines, calibrated.segments, skipped, axes, scale, motion.fps)
     filled = lines.padding(motion.fps)[skipped:]
-    lengths = np.diff([0, *(k + 1 - frames.dropped for k in jumps), len(root)])
-    counted = ~filled & np.repeat(2 * lengths >= lengths.max(), lengths)  # not short pieces between jumps
-    clip = Clip(_poses(*put_on_floor(root, segments, motion.fps, counted)), motion.fps, motion.path.stem)
+    counted = ~filled & _in_long_pieces([k - frames.dropped for k in repairs.jumps], len(filled))
+    on_floor = put_on_floor(body.root, body.segments, motion.fps, counted)
+    clip = Clip(_poses(*on_floor), motion.fps, motion.path.stem)
+    propped = unsupported_time(lines, positions, up.axis, motion.fps)
     remarks = (
-        *frame_remarks(broken, jumps, shortened, motion.fps, motion.timed),
+        *frame_remarks(repairs.frames, repairs.jumps, repairs.shortened, motion.fps, motion.timed),
         *smoothing_remarks(repeated[frames.dropped :], noise),
         *padding_remarks(filled, motion.fps, frames.dropped),
-        *leg_speed_remarks(legs, motion.fps),
-        *slow_step_remarks(path, legs, hip_to_ankle, figure_leg, motion.fps),
-        *in_place_remarks(path, hip_to_ankle, motion.fps),
-        *joint_jump_remarks([jump for jump in joint_jumps if jump.frame >= frames.dropped], motion),
-        *([f"the floor slopes by {np.rad2deg(slope):.1f}°: the motion is turned so that it is level"] if slope else ()),
-        *([_SITTING_REMARK.format(round(100.0 * hip_shift))] if hip_shift else ()),
+        *leg_speed_remarks(body.legs, motion.fps),
+        *slow_step_remarks(body.path, body.legs, body.hip_to_ankle, figure_leg, motion.fps),
+        *in_place_remarks(body.path, body.hip_to_ankle, motion.fps),
+        *joint_jump_remarks(repairs.joints, motion),
+        *([_SLOPE_REMARK.format(np.rad2deg(body.slope))] if body.slope else ()),
+        *([_SITTING_REMARK.format(round(100.0 * body.hip_shift))] if body.hip_shift else ()),
         *([_PROPPED_REMARK.format(propped)] if propped else ()),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, calibrated, roles),
@@ -146,6 +154,28 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         remarks,
     )
     return clip, report
+
+
+def _scaled_body(lines: BodyLines, segments: Array, skipped: int, axes: Array, scale: float, fps: float) -> _Body:
+    """The body from the frame `skipped` on, its legs scaled to the figure's, in the world, above a level floor."""
+    segments = quaternions.product(axes, with_twist_shared(segments[skipped:]))
+    hips, ankles = lines.middle[skipped:], lines.ankles[skipped:]
+    path = scale * quaternions.rotated(axes, hips - hips[0])
+    legs = scale * quaternions.rotated(axes, ankles - lines.hips[skipped:])
+    hip_to_ankle = scale * quaternions.rotated(axes, ankles - hips[:, None])
+    root = hips_over_feet(path, segments, legs, hip_to_ankle, fps)
+    hip_shift = float(np.ptp(root[:, 2] - path[:, 2]))
+    root, segments, slope = levelled(root, segments, fps)
+    if slope:  # levelling changes the heading of a body that does not face along the slope
+        facing = _world_axes(segments[0, 0], _Z)
+        root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
+    return _Body(root, segments, path, legs, hip_to_ankle, hip_shift, slope)
+
+
+def _in_long_pieces(jumps: list[int], n_frames: int) -> Mask:
+    """Which frames are in a piece between jumps that is half as long as the longest, or longer."""
+    lengths = np.diff([0, *(k + 1 for k in jumps), n_frames])
+    return np.repeat(2 * lengths >= lengths.max(), lengths)
 
 
 def _check_channels(motion: SourceMotion, rest: int | None) -> None:
