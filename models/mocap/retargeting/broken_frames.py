@@ -59,6 +59,8 @@ class Repaired(NamedTuple):
         Whether the last frame is left out.
     joints : tuple of JointJump
         Single joints that jump without return while the rest of the body does not, as when markers are swapped.
+    leaps : tuple of int
+        Frames after which the body's place leapt while its limbs moved on (`restarted_paths`), which is repaired.
     """
 
     motion: SourceMotion
@@ -66,6 +68,7 @@ class Repaired(NamedTuple):
     jumps: tuple[int, ...]
     shortened: bool
     joints: tuple[JointJump, ...]
+    leaps: tuple[int, ...] = ()
 
     def since(self, first: int) -> "Repaired":
         """Without repairs and jumps before a frame."""
@@ -73,6 +76,7 @@ class Repaired(NamedTuple):
             frames=tuple(k for k in self.frames if k >= first),
             jumps=tuple(k for k in self.jumps if k >= first),
             joints=tuple(jump for jump in self.joints if jump.frame >= first),
+            leaps=tuple(k for k in self.leaps if k >= first),
         )
 
 
@@ -119,8 +123,7 @@ def _without_gaps(motion: SourceMotion, roles: Roles) -> tuple[SourceMotion, Mas
 
 def _remaining_jumps(motion: SourceMotion, roles: Roles) -> tuple[tuple[int, ...], tuple[JointJump, ...]]:
     """Frames after which the whole pose or its place jumps, and the jumps of single joints at other times."""
-    used = used_joints(motion, roles)
-    steps = _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
+    used, steps = used_joints(motion, roles), joint_steps(motion, roles)
     jumping = (steps > np.maximum(_jump_limits(steps, 2), _MIN_JUMP_ANGLE)).mean(axis=1) >= _MIN_JOINT_FRACTION
     lost = motion.at_rest(used)
     jumping |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _MIN_JUMP_ANGLE)
@@ -141,6 +144,12 @@ def first_step_jumps(motion: SourceMotion, roles: Roles) -> bool:
 def used_joints(motion: SourceMotion, roles: Roles) -> list[int]:
     """Joints that segments of the figure follow, and their ancestors."""
     return sorted({above for joint in roles.segments.values() for above in ancestry(joint, motion.parents)})
+
+
+def joint_steps(motion: SourceMotion, roles: Roles) -> Array:
+    """How far the used joints turn from each frame to the next [rad], shape (n − 1, joints)."""
+    used = used_joints(motion, roles)
+    return _angles(motion.rotations[:-1, used], motion.rotations[1:, used])
 
 
 class _Track:

@@ -29,6 +29,7 @@ from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leg_proportions import hips_over_feet
 from models.mocap.retargeting.noise import without_noise
 from models.mocap.retargeting.repeated_frames import without_repeated_frames
+from models.mocap.retargeting.restarted_paths import with_path_carried_on
 from models.mocap.retargeting.retarget_report import (
     RetargetReport,
     axis_name,
@@ -38,6 +39,7 @@ from models.mocap.retargeting.retarget_report import (
     frame_remarks,
     in_place_remarks,
     joint_jump_remarks,
+    leap_remarks,
     leg_speed_remarks,
     padding_remarks,
     smoothing_remarks,
@@ -104,7 +106,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     rest = hints.rest_frame
     _check_channels(motion, rest)
     motion, repeated = without_repeated_frames(motion)
-    repairs = repair_frames(motion, roles, rest)
+    repairs = with_path_carried_on(repair_frames(motion, roles, rest), roles)
     motion, noise = without_noise(repairs.motion, roles, repairs.jumps)
     frames = _frames(motion, roles, rest)
     repairs = repairs.since(frames.dropped)
@@ -127,6 +129,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     propped = unsupported_time(lines, positions, up.axis, motion.fps)
     remarks = (
         *frame_remarks(repairs.frames, repairs.jumps, repairs.shortened, motion.fps, motion.timed),
+        *leap_remarks(repairs.leaps, motion.fps),
         *smoothing_remarks(repeated[frames.dropped :], noise),
         *padding_remarks(filled, motion.fps, frames.dropped),
         *leg_speed_remarks(body.legs, motion.fps),

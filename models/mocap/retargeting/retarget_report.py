@@ -206,8 +206,18 @@ def frame_remarks(
     if shortened:
         yield "the last frame did not belong to the motion before it: left out"
     if jumps:
-        times = ", ".join(f"{k / fps:.2f} s" for k in jumps[:8]) + (", …" if len(jumps) > 8 else "")
-        yield f"the whole body jumps in a frame at {times}: the gap there is too long to be interpolated"
+        yield f"the whole body jumps in a frame at {_times(jumps, fps)}: the gap there is too long to be interpolated"
+
+
+def leap_remarks(leaps: Sequence[int], fps: float) -> Iterator[str]:
+    """Frames after which the body's place leaps though its limbs move on (`restarted_paths`)."""
+    if leaps:
+        remark = f"the body leaps to another place in a frame at {_times(leaps, fps)}, though its limbs move on"
+        yield f"{remark}, as where a lap is repeated from its start: the path is carried on from where it was"
+
+
+def _times(frames: Sequence[int], fps: float) -> str:
+    return ", ".join(f"{k / fps:.2f} s" for k in frames[:8]) + (", …" if len(frames) > 8 else "")
 
 
 def smoothing_remarks(repeated: Mask, noise: Noise) -> Iterator[str]:
