@@ -345,12 +345,16 @@ def floor_remarks(clearance: Array, root: Array, fps: float, dropped: int) -> It
 
 
 def _fall_acceleration(heights: Array, fps: float) -> float:
-    """Downward acceleration [m/s²] of heights (n,) that follow a parabola, more slowly than in a fall; 0 otherwise."""
+    """Downward acceleration [m/s²] of heights (n,) that follow a parabola, more slowly than in a fall; 0 otherwise.
+
+    A parabola departs from its chord by more than the error that is allowed: one that does not is as good as a straight
+    line, the even rise of a climb.
+    """
     time = np.arange(len(heights)) / fps
     parabola = np.polyfit(time, heights, 2)
     change, fall = float(np.ptp(heights)), -2.0 * float(parabola[0])
-    error = rms(heights - np.polyval(parabola, time))
-    fits = change > _MIN_FALL_HEIGHT and error < _MAX_FALL_ERROR * change
+    error, bend = rms(heights - np.polyval(parabola, time)), fall * float(time[-1]) ** 2 / 8.0
+    fits = change > _MIN_FALL_HEIGHT and error < _MAX_FALL_ERROR * change < bend
     return fall if fits and 0.0 < fall < _MAX_FALL_RATIO * GRAVITY else 0.0
 
 

@@ -18,7 +18,7 @@ def climbing(height, first, last):
     for _ in range(4):
         for _ in range(2):
             laps.append(lap[:-1])
-            lap = clip.displacement.moved(lap)
+            lap = Clip(lap, clip.fps, "walk").displacement.moved(lap)
         corner = lap[0, :2]
         for degrees in range(6, 96, 6):
             x, y = corner - Rotation.from_euler("z", degrees, degrees=True).as_matrix()[:2, :2] @ corner
@@ -64,7 +64,7 @@ def test_up_axis_is_not_determined_for_a_climb_higher_than_any_studio(tmp_path):
 
 @pytest.mark.parametrize("height", [0.2, 1.0])
 def test_body_above_the_floor_for_longer_than_a_flight_is_remarked(height, tmp_path):
-    report = report_of(climbing(height, 0.3, 1.0), tmp_path / "r.bvh")
+    report = report_of(climbing(height, 0.4, 0.8), tmp_path / "r.bvh")
     (floor_remark,) = [remark for remark in report.remarks if "above the floor" in remark]
     assert abs(float(floor_remark.split("up to ")[1].split(" m ")[0]) - height) < 0.05
     assert "longer than any flight" in floor_remark
@@ -92,6 +92,15 @@ def test_flight_that_lasts_too_long_reports_the_true_frame_rate(slower, tmp_path
     rate = float(remark.split(" there: at ")[1].split(" frames")[0])
     assert rate == pytest.approx(clip.fps, rel=0.2)
     assert "--frame-rate" in remark
+
+
+def test_even_rise_of_a_climb_is_no_slow_fall():
+    """It bends down by 5 mm in 0.6 m."""
+    x = np.linspace(0.0, 1.0, 177)
+    root = np.outer(0.6 * x + 0.02 * x * (1.0 - x), [0.0, 0.0, 1.0])
+    (remark,) = floor_remarks(np.full(len(x), 0.5), root, 100.0, 0)
+    assert "frames a second" not in remark
+    assert "it stands on something that is not in the file" in remark
 
 
 def test_root_that_does_not_move_is_given_as_the_reason_for_hanging_feet():
