@@ -66,7 +66,8 @@ def correct_pace(clip: Clip) -> Paced:
 def flight_acceleration(clip: Clip) -> float | None:
     """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None.
 
-    Flights are found by heights alone, unlike in `contacts`, since all speeds depend on the rate in doubt.
+    Flights are found by heights alone, unlike in `contacts`, since all speeds depend on the rate in doubt. A body that
+    is accelerated upwards in one stands on something, at whatever rate: on feet that hover, for example.
     """
     heights = contact_points(clip.poses, FOOT_CONTACTS + HAND_CONTACTS)[:, :, 2].min(axis=1) - CONTACT_RADIUS
     flights = [
@@ -77,5 +78,6 @@ def flight_acceleration(clip: Clip) -> float | None:
     if not flights:
         return None
     height = momentum(clip).com[:, 2]
-    falls = [-2.0 * np.polyfit(np.arange(b - a) / clip.fps, height[a:b], 2)[0] for a, b in flights]
-    return float(np.average(falls, weights=[float(b - a) ** 4 for a, b in flights]))
+    falls = np.array([-2.0 * np.polyfit(np.arange(b - a) / clip.fps, height[a:b], 2)[0] for a, b in flights])
+    weights = np.where(falls > 0.0, [float(b - a) ** 4 for a, b in flights], 0.0)
+    return float(np.average(falls, weights=weights)) if weights.any() else None

@@ -1,5 +1,6 @@
 """The pace of a capture, from the acceleration of its flights."""
 
+import numpy as np
 import pytest
 
 from geometry.physics import GRAVITY
@@ -29,6 +30,15 @@ def test_slow_fall_may_be_supported_and_keeps_its_pace():
     clip = embedded("jump")
     slow = Clip(clip.poses, 0.7 * clip.fps, "slow")
     assert correct_pace(slow).clip is slow
+
+
+def test_body_that_is_accelerated_upwards_on_hovering_feet_is_in_no_flight():
+    clip = embedded("jump")
+    hovering = np.repeat(clip.poses[-1:], 60, axis=0)
+    hovering[:, 2] += 0.1 + 2.5 * np.linspace(-0.25, 0.25, 60) ** 2
+    longer = Clip(np.vstack((clip.poses, hovering)), clip.fps, "jump")
+    assert flight_acceleration(longer) == pytest.approx(flight_acceleration(clip))
+    assert flight_acceleration(Clip(hovering, clip.fps, "hovering")) is None
 
 
 def test_clip_without_flight_keeps_its_pace():
