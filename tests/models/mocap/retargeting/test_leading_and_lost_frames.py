@@ -163,7 +163,7 @@ def test_motion_that_begins_at_any_frame_keeps_its_frames(name, tmp_path):
         for first in range(0, motion.n_frames - 12 * every, max(1, motion.n_frames // 12)):
             part = subsampled(motion, slice(first, None, every))
             assert leading_frame_count(part, roles) == 0, (every, first)
-            assert repair_frames(part, roles)[1:] == ((), (), False, ()), (every, first)
+            assert repair_frames(part, roles)[1:] == ((), (), False, (), ()), (every, first)
 
 
 @pytest.mark.parametrize("name", embedded_names())
