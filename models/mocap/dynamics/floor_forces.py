@@ -17,13 +17,13 @@ on repeat falls either way.
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.optimize import nnls
 
 from geometry.arrays import Array, Mask
 from geometry.physics import FRICTION
-from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, N_TANGENT, figure_model
+from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS, figure_model
+from models.mocap.dynamics.inverse_dynamics import SegmentPlaces, inverse_dynamics
 
 _REGULARISATION = 0.01  # ε: makes the forces unique, shared between spheres, and continuous in the state
 _PYRAMID_SLOPE = FRICTION / np.sqrt(2)  # so that the pyramid lies inside the friction cone
@@ -77,18 +77,22 @@ class RequiredWrench(NamedTuple):
         Centre of mass in W [m].
     wrench : (m, 6) array
         Required force, and moment about the centre of mass, in W [N, N m].
-    torque : (m, 51) array
-        Joint torques without contact forces [N m].
-    anchors, frames : (m, c, 3) and (m, c, 3, 3) arrays
-        Positions in W of the joints of the `carriers` [m], and R_WB of these segments.
+    force : (m, 57) array
+        Generalised forces without contact forces: of the root, in its own frame, and the joint torques [N, N m].
+    places : SegmentPlaces
+        The segments.
     """
 
     spheres: Array
     com: Array
     wrench: Array
-    torque: Array
-    anchors: Array
-    frames: Array
+    force: Array
+    places: SegmentPlaces
+
+    @property
+    def torque(self) -> Array:
+        """Joint torques without contact forces, shape (m, 51) [N m]."""
+        return self.force[:, 6:]
 
     def columns(self) -> Array:
         """A: wrenches about the centre of mass of a unit force along every edge of every sphere, shape (m, 6, 4k)."""
@@ -102,9 +106,10 @@ class RequiredWrench(NamedTuple):
         m, k = self.spheres.shape[:2]
         soles = self.spheres - (0.0, 0.0, CONTACT_RADIUS)
         levers = np.zeros((*self.torque.shape, 4 * k))
-        for joint, (body, loading) in enumerate(carriers(k)):
-            moments = np.cross((soles[:, loading] - self.anchors[:, joint, None])[:, :, None], EDGES).reshape(m, -1, 3)
-            torques = np.einsum("mij,mei->mje", self.frames[:, joint], moments)
+        for body, loading in carriers(k):
+            arms = soles[:, loading] - self.places.joints[:, body, None]
+            moments = np.cross(arms[:, :, None], EDGES).reshape(m, -1, 3)
+            torques = np.einsum("mij,mei->mje", self.places.frames[:, body], moments)
             levers[:, 3 * (body - 1) : 3 * body, 4 * loading.start : 4 * loading.stop] = torques
         return levers
 
@@ -113,9 +118,9 @@ class RequiredWrench(NamedTuple):
         m, k = self.spheres.shape[:2]
         soles, forces = self.spheres - (0.0, 0.0, CONTACT_RADIUS), grip.reshape(m, k, 4) @ EDGES
         torque = self.torque.copy()
-        for joint, (body, loading) in enumerate(carriers(k)):
-            moment = np.cross(soles[:, loading] - self.anchors[:, joint, None], forces[:, loading]).sum(axis=1)
-            torque[:, 3 * (body - 1) : 3 * body] -= np.einsum("mij,mi->mj", self.frames[:, joint], moment)
+        for body, loading in carriers(k):
+            moment = np.cross(soles[:, loading] - self.places.joints[:, body, None], forces[:, loading]).sum(axis=1)
+            torque[:, 3 * (body - 1) : 3 * body] -= np.einsum("mij,mi->mj", self.places.frames[:, body], moment)
         return torque
 
 
@@ -128,36 +133,33 @@ class Floor:
         S: weight of a residual moment relative to a residual force [1/m].
     spheres : tuple of str
         Contact spheres that may bear load: `FOOT_CONTACTS` or `ALL_CONTACTS`.
+
+    Attributes
+    ----------
+    body_weight : float
+        Weight of the figure [N].
+    segments : list of int
+        Segments of the spheres, as in `SegmentPlaces`.
     """
 
     def __init__(self, moment_per_force: float = 2.0, spheres: tuple[str, ...] = FOOT_CONTACTS) -> None:
-        self._model = figure_model()
-        self._data = mujoco.MjData(self._model)
-        self.body_weight = float(self._model.body_subtreemass[0] * -self._model.opt.gravity[2])
-        self._geoms = [self._model.geom(name).id for name in spheres]
-        self._bodies = [self._model.body(BODIES[carrier.body]).id for carrier in carriers(len(spheres))]
+        model = figure_model()
+        self.body_weight = float(model.body_subtreemass[0] * -model.opt.gravity[2])
+        geoms = [model.geom(name).id for name in spheres]
+        self.segments: list[int] = (model.geom_bodyid[geoms] - 1).tolist()
+        self._offsets = model.geom_pos[geoms]
+        self._mass_shares = model.body_mass[1:] / model.body_subtreemass[1]
         self._scale = np.repeat([1.0, moment_per_force], 3)
 
     def demand(self, q: Array, v: Array, a: Array) -> RequiredWrench:
         """Inverse dynamics of states, shapes (m, 75), (m, 57), (m, 57)."""
-        m, k, c, d = len(q), len(self._geoms), len(self._bodies), self._data
-        force, spheres, com = np.empty((m, N_TANGENT)), np.empty((m, k, 3)), np.empty((m, 3))
-        anchors, frames, root = np.empty((m, c, 3)), np.empty((m, c, 9)), np.empty((m, 9))
-        pose_changes = np.any(q[1:] != q[:-1], axis=1)  # consecutive states of one pose share its kinematics
-        for i in range(m):
-            d.qpos[:], d.qvel[:], d.qacc[:] = q[i], v[i], a[i]
-            if i > 0 and not pose_changes[i - 1]:
-                mujoco.mj_inverseSkip(self._model, d, mujoco.mjtStage.mjSTAGE_POS, 1)
-                force[i], spheres[i], com[i] = d.qfrc_inverse, spheres[i - 1], com[i - 1]
-                anchors[i], frames[i], root[i] = anchors[i - 1], frames[i - 1], root[i - 1]
-                continue
-            mujoco.mj_inverse(self._model, d)
-            force[i], spheres[i], com[i] = d.qfrc_inverse, d.geom_xpos[self._geoms], d.subtree_com[1]
-            anchors[i], frames[i], root[i] = d.xpos[self._bodies], d.xmat[self._bodies], d.xmat[1]
-        about_root = np.einsum("mij,mj->mi", root.reshape(m, 3, 3), force[:, 3:6])
+        force, places = inverse_dynamics(q, v, a)
+        offsets = np.einsum("mkij,kj->mki", places.frames[:, self.segments], self._offsets)
+        com = self._mass_shares @ places.centres
+        about_root = np.einsum("mij,mj->mi", places.frames[:, 0], force[:, 3:6])
         moment = about_root - np.cross(com - q[:, :3], force[:, :3])
-        wrench = np.concatenate([force[:, :3], moment], axis=1)
-        return RequiredWrench(spheres, com, wrench, force[:, 6:], anchors, frames.reshape(m, c, 3, 3))
+        wrench = np.concatenate((force[:, :3], moment), axis=1)
+        return RequiredWrench(places.joints[:, self.segments] + offsets, com, wrench, force, places)
 
     def grip(self, demand: RequiredWrench, standing: Mask) -> Array:
         """f*: forces along the pyramids' edges, shape (m, 4k) [N]; only spheres in `standing` (m, k) bear load."""

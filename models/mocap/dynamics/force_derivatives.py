@@ -16,46 +16,23 @@ u = 0, a = W by acceleration (Carpentier & Mansard 2018, Robotics: Science and S
 coordinates Singh, Russell & Wensing 2022, IEEE Robot. Autom. Lett. 7).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from geometry.arrays import Array, Mask
 from geometry.quaternions import cross_matrix
-from models.humanoid.skeleton import N_TANGENT
+from models.humanoid.skeleton import N_TANGENT, figure_model
+from models.mocap.dynamics.inverse_dynamics import SegmentPlaces
 
 
-class SegmentPlaces(NamedTuple):
-    """Segments of the figure in m states, in W; the first is the pelvis.
-
-    Attributes
-    ----------
-    joints, centres : arrays, shape (m, 18, 3)
-        Positions of the joints and of the centres of mass [m].
-    frames, principal : arrays, shape (m, 18, 3, 3)
-        Rotations of the segments and of their principal axes of inertia.
-    """
-
-    joints: Array
-    centres: Array
-    frames: Array
-    principal: Array
-
-    @staticmethod
-    def empty(m: int) -> "SegmentPlaces":
-        """Places that are not yet known."""
-        return SegmentPlaces(*(np.empty((m, N_TANGENT // 3 - 1, *shape)) for shape in ((3,), (3,), (3, 3), (3, 3))))
-
-
-def force_derivatives(model: mujoco.MjModel, places: SegmentPlaces, v: Array, a: Array) -> Array:
-    """Derivatives of the generalised forces by position, velocity and acceleration.
+def force_derivatives(places: SegmentPlaces, v: Array, a: Array) -> Array:
+    """Derivatives of the generalised forces of `inverse_dynamics` by position, velocity and acceleration.
 
     Parameters
     ----------
-    model : MjModel
-        The figure: a free root, and ball joints at the origins of the other segments.
     places : SegmentPlaces
         Of m states.
     v, a : arrays, shape (m, 57)
@@ -65,8 +42,8 @@ def force_derivatives(model: mujoco.MjModel, places: SegmentPlaces, v: Array, a:
     -------
     array, shape (m, 3, 57, 57)
         [:, o, i, k] of force i by position (o = 0; rotations are in the segments' frames), velocity, acceleration k.
-        The joints' damping and the motors' inertia are included.
     """
+    model = figure_model()
     motions = _motions(places)
     segments, outer = _velocities(model, motions, v, a)
     inertia, cross = _inertias(model, places), _cross(segments.velocity)
@@ -86,7 +63,8 @@ def force_derivatives(model: mujoco.MjModel, places: SegmentPlaces, v: Array, a:
     )
     projections = motions.swapaxes(-1, -2)
     within = _rows(np.concatenate((projections @ inertia, projections @ bias), axis=-1))
-    carried, carries = _carried(model.body_parentid)
+    carried = np.repeat(_carriers(), 3, axis=0)
+    carries = carried.T & ~carried
     derivatives = np.empty((len(v), 3, N_TANGENT, N_TANGENT))
     for order, (u, change) in enumerate(changes):
         total = inertia @ change + bias @ u
@@ -98,6 +76,22 @@ def force_derivatives(model: mujoco.MjModel, places: SegmentPlaces, v: Array, a:
     derivatives[:, 1] += np.diag(model.dof_damping)
     derivatives[:, 2] += np.diag(model.dof_armature)
     return derivatives
+
+
+def point_derivatives(places: SegmentPlaces, points: Array, segments: Sequence[int]) -> Array:
+    """Derivatives by position of points (m, k, 3) in W that are fixed to k segments, shape (m, k, 3, 57)."""
+    columns = _columns(_motions(places))[:, None]
+    arms = cross_matrix(points - places.joints[:, :1])
+    return (columns[:, :, 3:] - arms @ columns[:, :, :3]) * _moving(segments)
+
+
+def turn_derivatives(places: SegmentPlaces, segments: Sequence[int]) -> Array:
+    """Derivatives by position of the rotations of k segments, as rotation vectors in W, shape (m, k, 3, 57)."""
+    return _columns(_motions(places))[:, None, :3] * _moving(segments)
+
+
+def _moving(segments: Sequence[int]) -> Mask:
+    return _carriers()[1 + np.asarray(segments), None]
 
 
 class _Velocities(NamedTuple):
@@ -167,10 +161,10 @@ def _columns(of_bodies: Array) -> Array:
     return _rows(of_bodies.swapaxes(-1, -2)).swapaxes(-1, -2)
 
 
-def _carried(parent: npt.NDArray[np.integer]) -> tuple[Mask, Mask]:
-    """Whether joint of coordinate k carries that of coordinate i, or is it; whether i's carries k's: both (57, 57)."""
-    within = np.eye(len(parent), dtype=bool)
+def _carriers() -> Mask:
+    """Which coordinates (57) move a body (19): those of its joint and of the joints that carry it."""
+    parent = figure_model().body_parentid
+    moves = np.eye(len(parent), dtype=bool)
     for body in range(1, len(parent)):
-        within[body] |= within[parent[body]]
-    carried = np.kron(within, np.ones((3, 3), dtype=bool))
-    return carried, carried.T & ~carried
+        moves[body] |= moves[parent[body]]
+    return np.repeat(moves, 3, axis=1)

@@ -19,12 +19,12 @@ import numpy.typing as npt
 from geometry import quaternions
 from geometry.arrays import Array
 from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, joint_range, torque_limit
-from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, RequiredWrench
 from models.mocap.motion.interpenetration import PARTS, overlaps
 from models.mocap.motion.ranges import vectors_in_ranges
 from models.mocap.preparation.change import Change
-from models.mocap.preparation.inverse_dynamics import InverseDynamics
 from models.mocap.preparation.stances import Stances, clearance
+from models.mocap.preparation.wrench_derivatives import WrenchDerivatives
 
 JOINT_LIMIT_MARGIN = 0.02  # distance kept from the joints' limits [rad]
 _STRAIN_THRESHOLD = 0.75  # fraction of the torque limits beyond which torque is penalised
@@ -154,8 +154,7 @@ class MotionErrors:
         state = self.change.states(x.reshape(-1, N_TANGENT), instants)
         m = len(state.q)
         pushing, grounded, pinned = self.pushing[instants], self.grounded[instants], self.pinned[instants]
-        dynamics = InverseDynamics(state, with_jacobian, self.contacts)
-        demand = dynamics.demand
+        demand = self.floor.demand(state.q, state.v, state.a)
         grip = self.floor.grip(demand, pushing)
         residual = demand.wrench - np.einsum("mij,mj->mi", demand.columns(), grip)
         weight = self.floor.body_weight
@@ -177,10 +176,11 @@ class MotionErrors:
         if not with_jacobian:
             return Errors(weighted, None, residual, grip, torque_ratio)
         jacobian = np.zeros((m, 3, weighted.shape[1], N_TANGENT))
-        self._differentiate_forces(jacobian, dynamics, grip, scale, strain)
+        derivatives = WrenchDerivatives(state, demand, self.floor.segments)
+        self._differentiate_forces(jacobian, demand, derivatives, grip, scale, strain)
         slips, depths = slice(DYNAMIC_COUNT, DYNAMIC_COUNT + 3 * k), slice(DYNAMIC_COUNT + 3 * k, DYNAMIC_COUNT + 4 * k)
-        jacobian[:, 0, slips] = (w.slip * pinned[..., None] * dynamics.spheres).reshape(m, 3 * k, N_TANGENT)
-        jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * dynamics.spheres[:, :, 2]
+        jacobian[:, 0, slips] = (w.slip * pinned[..., None] * derivatives.spheres).reshape(m, 3 * k, N_TANGENT)
+        jacobian[:, 0, depths] = w.depth * (depth < 0)[:, :, None] * derivatives.spheres[:, :, 2]
         for joint in range(len(JOINTS)):
             axes = slice(3 * joint, 3 * joint + 3)
             jacobian[:, 0, depths.stop :][:, axes, 6:][:, :, axes] = limits.rates[:, joint]
@@ -201,17 +201,25 @@ class MotionErrors:
         return _LimitErrors(self.w.limit * penalty.reshape(len(q), -1), rates)
 
     def _differentiate_forces(
-        self, jacobian: Array, dynamics: InverseDynamics, grip: Array, scale: Array, strain: Array
+        self,
+        jacobian: Array,
+        demand: RequiredWrench,
+        derivatives: WrenchDerivatives,
+        grip: Array,
+        scale: Array,
+        strain: Array,
     ) -> None:
         """Write the rows of torques and residual wrench; `Floor.answer` gives how contact forces follow the wrench."""
-        demand, wrench_rows = dynamics.demand, dynamics.wrench
+        wrench_rows = derivatives.wrench
         force_gain = self.floor.answer(demand, grip)
         projection = np.eye(6) - demand.columns() @ force_gain
         forces = grip.reshape(len(grip), -1, 4) @ EDGES
         arms = np.zeros((len(grip), 6, N_TANGENT))
         for sphere in range(len(self.contacts)):
             # Moments of the contact forces change with their lever arms.
-            arms[:, 3:] -= quaternions.cross_matrix(forces[:, sphere]) @ (dynamics.spheres[:, sphere] - dynamics.com)
+            arms[:, 3:] -= quaternions.cross_matrix(forces[:, sphere]) @ (
+                derivatives.spheres[:, sphere] - derivatives.com
+            )
         wrench_rows[:, 0] -= arms
         jacobian[:, :, TORQUE_COUNT:DYNAMIC_COUNT] = scale[:, None, :, None] * np.einsum(
             "mij,mojn->moin", projection, wrench_rows
@@ -220,6 +228,6 @@ class MotionErrors:
         if len(strained):
             gain = self.w.strain * (strain[strained] != 0) / torque_limit()
             force_response = demand.levers()[strained] @ force_gain[strained]
-            torque = dynamics.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
-            torque[:, 0] -= dynamics.torque_by_contact_force(forces, strained)
+            torque = derivatives.torque[strained] - np.einsum("mti,moin->motn", force_response, wrench_rows[strained])
+            torque[:, 0] -= derivatives.torque_by_contact_force(forces, strained)
             jacobian[strained, :, :TORQUE_COUNT] = gain[:, None, :, None] * torque

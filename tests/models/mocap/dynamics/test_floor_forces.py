@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from models.humanoid.skeleton import FOOT_CONTACTS, N_TANGENT, figure_model, rest_pose
-from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, RequiredWrench, residual
+from models.mocap.dynamics.floor_forces import ALL_CONTACTS, EDGES, Floor, residual
 from models.mocap.library import embedded
 
 STANDING = np.ones((1, 8), dtype=bool)
@@ -24,7 +24,7 @@ def test_batched_demand_of_repeated_poses_equals_that_of_single_states(
     floor = Floor(spheres=ALL_CONTACTS)
     batched = floor.demand(*states)
     single = [floor.demand(*(part[k : k + 1] for part in states)) for k in range(len(states[0]))]
-    for name in RequiredWrench._fields:
+    for name in ("spheres", "com", "wrench", "force"):
         np.testing.assert_array_equal(getattr(batched, name), np.concatenate([getattr(d, name) for d in single]))
 
 
