@@ -63,7 +63,7 @@ def force_derivatives(places: SegmentPlaces, v: Array, a: Array) -> Array:
     )
     projections = motions.swapaxes(-1, -2)
     within = _rows(np.concatenate((projections @ inertia, projections @ bias), axis=-1))
-    carried = np.repeat(_carriers(), 3, axis=0)
+    carried = np.repeat(_moving_coordinates(), 3, axis=0)
     carries = carried.T & ~carried
     derivatives = np.empty((len(v), 3, N_TANGENT, N_TANGENT))
     for order, (u, change) in enumerate(changes):
@@ -91,7 +91,7 @@ def turn_derivatives(places: SegmentPlaces, segments: Sequence[int]) -> Array:
 
 
 def _moving(segments: Sequence[int]) -> Mask:
-    return _carriers()[1 + np.asarray(segments), None]
+    return _moving_coordinates()[1 + np.asarray(segments), None]
 
 
 class _Velocities(NamedTuple):
@@ -161,7 +161,7 @@ def _columns(of_bodies: Array) -> Array:
     return _rows(of_bodies.swapaxes(-1, -2)).swapaxes(-1, -2)
 
 
-def _carriers() -> Mask:
+def _moving_coordinates() -> Mask:
     """Which coordinates (57) move a body (19): those of its joint and of the joints that carry it."""
     parent = figure_model().body_parentid
     moves = np.eye(len(parent), dtype=bool)

@@ -6,6 +6,7 @@ hips, scaled by the length of the legs (`leg_proportions` for legs of other prop
 the feet on the floor, so flights remain parabolas.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -132,17 +133,13 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
         *leap_remarks(repairs.leaps, motion.fps),
         *smoothing_remarks(repeated[frames.dropped :], noise),
         *padding_remarks(filled, motion.fps, frames.dropped),
-        *leg_speed_remarks(body.legs, motion.fps),
-        *slow_step_remarks(body.path, body.legs, body.hip_to_ankle, figure_leg, motion.fps),
-        *in_place_remarks(body.path, body.hip_to_ankle, motion.fps),
+        *_step_remarks(body, figure_leg, motion.fps),
         *joint_jump_remarks(repairs.joints, motion),
-        *([_SLOPE_REMARK.format(np.rad2deg(body.slope))] if body.slope else ()),
-        *([_SITTING_REMARK.format(round(100.0 * body.hip_shift))] if body.hip_shift else ()),
-        *([_PROPPED_REMARK.format(propped)] if propped else ()),
+        *_support_remarks(body, propped),
         *beyond_range_remarks(clip.poses),
         *endless_limb_remarks(lines, calibrated, roles),
         *stretch_remarks(lines),
-        *(calibration_remarks(calibrated, lines, roles, motion.n_frames - frames.dropped) if rest is None else ()),
+        *(calibration_remarks(calibrated, lines, roles, len(filled)) if rest is None else ()),
     )
     report = RetargetReport(
         {body: motion.joints[joint] for body, joint in roles.segments.items()},
@@ -173,6 +170,23 @@ def _scaled_body(lines: BodyLines, segments: Array, skipped: int, axes: Array, s
         facing = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
     return _Body(root, segments, path, legs, hip_to_ankle, hip_shift, slope)
+
+
+def _step_remarks(body: _Body, figure_leg: float, fps: float) -> Iterator[str]:
+    """Legs that are too fast, steps that are too slow, and steps that do not carry the body along."""
+    yield from leg_speed_remarks(body.legs, fps)
+    yield from slow_step_remarks(body.path, body.legs, body.hip_to_ankle, figure_leg, fps)
+    yield from in_place_remarks(body.path, body.hip_to_ankle, fps)
+
+
+def _support_remarks(body: _Body, propped: float) -> Iterator[str]:
+    """A floor that was levelled, hips that were moved, and a time [s] in which the body is propped up by something."""
+    if body.slope:
+        yield _SLOPE_REMARK.format(np.rad2deg(body.slope))
+    if body.hip_shift:
+        yield _SITTING_REMARK.format(round(100.0 * body.hip_shift))
+    if propped:
+        yield _PROPPED_REMARK.format(propped)
 
 
 def _in_long_pieces(jumps: list[int], n_frames: int) -> Mask:

@@ -62,9 +62,10 @@ def test_up_axis_is_not_determined_for_a_climb_higher_than_any_studio(tmp_path):
         load(tmp_path / "r.bvh")
 
 
-@pytest.mark.parametrize("height", [0.2, 1.0])
-def test_body_above_the_floor_for_longer_than_a_flight_is_remarked(height, tmp_path):
-    report = report_of(climbing(height, 0.4, 0.8), tmp_path / "r.bvh")
+@pytest.mark.parametrize(("height", "first", "last"), [(0.2, 0.4, 0.8), (1.0, 0.4, 0.8), (1.0, 0.3, 1.0)])
+def test_body_above_the_floor_for_longer_than_a_flight_is_remarked(height, first, last, tmp_path):
+    """A hill of 0.2 m from 0.3 to 1.0 is taken for a slope, which is also said."""
+    report = report_of(climbing(height, first, last), tmp_path / "r.bvh")
     (floor_remark,) = [remark for remark in report.remarks if "above the floor" in remark]
     assert abs(float(floor_remark.split("up to ")[1].split(" m ")[0]) - height) < 0.05
     assert "longer than any flight" in floor_remark
