@@ -170,6 +170,7 @@ def test_closed_pipe_ends_the_command_silently_with_code_141(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
+@pytest.mark.slow
 def test_closed_standard_stream_affects_neither_result_nor_exit_code(closed: str, tmp_path: Path) -> None:
     from models.mocap.library import embedded
     from models.mocap.readers.own_bvh import write_bvh
@@ -192,6 +193,7 @@ def test_interrupt_during_imports_is_one_line() -> None:
     assert completed.returncode == 130
 
 
+@pytest.mark.slow
 def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_path: Path) -> None:
     """A command neither prints it nor writes MuJoCo's log into the user's folder."""
     code = (
@@ -209,6 +211,7 @@ def test_mujoco_warnings_are_counted_by_commands_and_left_to_library_users(tmp_p
 
 
 @pytest.mark.parametrize("first", ["from experiments.cli import main; main(['clips'])", "import hvf"])
+@pytest.mark.slow
 def test_missing_library_for_mujoco_gl_is_named_and_skipped(first: str) -> None:
     code = "import ctypes.util; ctypes.util.find_library = lambda name: None\n"
     code += f"{first}; import os; print(os.environ.get('MUJOCO_GL'))"

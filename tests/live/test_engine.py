@@ -156,6 +156,7 @@ def test_gains_of_another_mode_are_refused():
         engine.set_gains(run_config(mode="bunny", figure="kinematic"))
 
 
+@pytest.mark.slow
 def test_run_from_a_stored_state_is_repeated_exactly():
     engine = Engine(wire(run_config(mode="stretch", seconds=3600.0)))
     run(engine, 2.4)

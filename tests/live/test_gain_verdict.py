@@ -27,6 +27,7 @@ def test_gain_verdict_equals_the_certificate(words):
     assert (found.stability.verdict, found.stability.margin) == (whole.verdict, whole.margin)
 
 
+@pytest.mark.slow
 def test_unstable_gain_is_red_with_a_reason():
     (found,) = gain_verdicts(run_config(stiffness=11000.0))
     assert found.stability.verdict == "refuted"

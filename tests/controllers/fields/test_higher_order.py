@@ -120,6 +120,7 @@ def _mismatch(river, hand):
     return np.sqrt(e @ e - (e @ y) ** 2 / (y @ y + x @ x))
 
 
+@pytest.mark.slow
 def test_smooth_field_tends_to_the_discrete_one_as_sigma_vanishes():
     rng = np.random.default_rng(2)
     compared = 0

@@ -69,6 +69,7 @@ commands = st.lists(
 
 @settings(max_examples=150)
 @given(commands, st.booleans(), st.booleans())
+@pytest.mark.slow
 def test_no_command_sequence_sends_a_force_above_the_limits(sequence, permitted: bool, dead_man: bool) -> None:
     gated = Gated(permitted=permitted, dead_man=dead_man, ramp=0.05, quiet=0.01)
     gate, last, clean = gated.gate, np.zeros(3), 0

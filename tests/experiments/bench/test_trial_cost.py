@@ -14,6 +14,7 @@ def test_study_overhead_is_positive_and_below_its_trials() -> None:
     assert seconds > 0.0
 
 
+@pytest.mark.slow
 def test_memory_growth_over_trials_is_measured() -> None:
     assert 0.5 < grown(40, QUIET) < 1.5
 

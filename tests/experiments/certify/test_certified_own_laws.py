@@ -302,6 +302,7 @@ def test_reasons_contain_no_library_paths():
 
 
 @pytest.mark.parametrize("delay", [1, 1000])  # fewer and more calls than there are sampled hand states
+@pytest.mark.slow
 def test_law_with_internal_state_is_unknown_every_time(delay: int) -> None:
     queue = [0.0] * delay
 
@@ -351,6 +352,7 @@ floor_law = hvf.law(floor)
         (2 * FOLLOW.limited(4.0), hvf.Follow(CURVE, k_r=600.0, b_d=16.0).limited(8.0)),
     ],
 )
+@pytest.mark.slow
 def test_scaled_field_is_certified_as_field_with_scaled_gains(scaled, plain):
     for of_scaled, of_plain in zip(verdicts(scaled), verdicts(plain), strict=True):
         assert of_scaled.verdict == of_plain.verdict != "unknown"

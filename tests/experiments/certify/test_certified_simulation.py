@@ -77,6 +77,7 @@ def soft_floor(hand, k=500.0):
     return 0.0, 0.0, k * hand.p[2] ** 2 if hand.p[2] < 0 else 0.0
 
 
+@pytest.mark.slow
 def test_nonlinear_or_gated_law_is_unknown_and_named() -> None:
     curved = hvf.certify(cheer_simulation(hvf.Follow(CURVE, k_r=300, b_d=8) + soft_floor)).stability
     gated = hvf.certify(

@@ -201,6 +201,7 @@ def test_invalid_certificate_files_are_refused(tmp_path, text):
             read_certificate(tmp_path / CERTIFICATE)
 
 
+@pytest.mark.slow
 def test_clip_certificate_is_reused_and_verified_against_clip_and_tolerances(tmp_path, capsys):
     out = tmp_path / "jump"
     clip = ["certify", "--clip", "jump", "--out", str(out)]

@@ -49,6 +49,7 @@ def toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Unit, ...]:
     )
 
 
+@pytest.mark.slow
 def test_missing_units_are_compiled_in_parallel_and_reported_once(toys, capsys):
     assert missing_units((*toys, *toys)) == (toys[1], toys[0])
     compiler(Console())(toys)
@@ -60,6 +61,7 @@ def test_missing_units_are_compiled_in_parallel_and_reported_once(toys, capsys):
     assert not capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_only_missing_units_are_compiled(toys):
     compiled: list[Unit] = []
     toys[0].load()

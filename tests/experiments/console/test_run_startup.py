@@ -45,10 +45,12 @@ def test_only_the_named_command_is_imported() -> None:
     assert found == {"experiments.commands.track"}
 
 
+@pytest.mark.slow
 def test_compilation_listener_reports_compiled_functions() -> None:
     assert "compiles smooth_step" in compiled_names(run_python(LISTENER + _COMPILES))
 
 
+@pytest.mark.slow
 def test_law_evaluated_from_python_is_compiled_once_for_all_processes() -> None:
     """As certification does with the program of a run."""
     for completed in (run_python(LISTENER + _EVALUATE_LAW), run_python(LISTENER + _EVALUATE_LAW)):

@@ -142,6 +142,7 @@ def rendered(run: Path, show: Show, ghost: Ghost, backend: str) -> Colours:
     return picture
 
 
+@pytest.mark.slow
 def test_ghost_and_force_arrow_are_drawn_only_if_present(tmp_path: Path, backend: str) -> None:
     run, rest = write_run(tmp_path / "run", RunSpec()), write_run(tmp_path / "rest", RunSpec(force=0.0))
     for ghost, least, most in (("default", 300, np.inf), ("none", 0, 10)):

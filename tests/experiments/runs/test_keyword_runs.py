@@ -44,6 +44,7 @@ def test_keyword_run_equals_command_line_run(tmp_path: Path) -> None:
             np.testing.assert_array_equal(values, recording.channel("ticks", name)[:], err_msg=name)
 
 
+@pytest.mark.slow
 def test_recorded_keyword_run_is_reproduced_and_changed_from_its_folder(tmp_path: Path) -> None:
     hvf.run(**KEYWORDS, record=tmp_path / "run")
     assert main(["reproduce", str(tmp_path / "run")]) == 0
@@ -59,6 +60,7 @@ def test_run_has_remarks_on_unsuitable_clips() -> None:
     assert str(run).startswith(run.remarks[0])
 
 
+@pytest.mark.slow
 def test_lifted_curve_plays_its_clip(lifted: Path) -> None:
     lifted_map = hvf.Lifted(lifted, "cheer")
     assert lifted_map.names == ("walk", "cheer")

@@ -79,6 +79,7 @@ def test_changing_person_ends_on_the_other_curve() -> None:
     assert np.median(radius(found, 4.5, 6.0)) > 0.056
 
 
+@pytest.mark.slow
 def test_resisting_person_stops_and_continues() -> None:
     found = channels_of(hvf.intents.Resist(at=1.5, seconds=2.0), 6.0, (60.0, 4.0))
     stayed = within(found, "p", 2.0, 3.5)

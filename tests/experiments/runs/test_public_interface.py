@@ -219,6 +219,7 @@ def test_animation_is_written_only_to_new_bvh_files(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["mine.bvh"]
 
 
+@pytest.mark.slow
 def test_repr_of_field_and_certificate_is_short() -> None:
     field = (0.5 * hvf.Follow(CURVE, k_r=300, b_d=8) + level).limited(8.0)
     text = repr(field)

@@ -41,6 +41,7 @@ def replayed(recorded: hvf.Run, k_r: float, **parts: Any) -> hvf.Simulation:
     return simulation(follow(k_r), device=hvf.Replay(str(recorded.folder)), **({"figure": DEVICE_ALONE} | parts))
 
 
+@pytest.mark.slow
 def test_replay_in_same_field_reproduces_motion_and_force(recorded: hvf.Run) -> None:
     again = replayed(recorded, 300.0).run(SECONDS)
     for name in (*HAND, "force", "distance"):

@@ -9,6 +9,7 @@ import hvf
 from experiments.cli import main
 
 
+@pytest.mark.slow
 def test_recording_of_python_simulation_refers_to_its_script(
     sim: hvf.Simulation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -96,6 +96,7 @@ def test_channels_of_an_unreferenced_run_can_be_read(sim: hvf.Simulation) -> Non
     assert sim.run(0.1).ticks["p"].shape == (100, 3)
 
 
+@pytest.mark.slow
 def test_run_in_a_relative_folder_is_read_from_any_working_directory(
     sim: hvf.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,6 +124,7 @@ def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pyt
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_html_repr_of_run_contains_the_replay(run: hvf.Run) -> None:
     page = run._repr_html_()
     assert page.startswith("<iframe srcdoc=")

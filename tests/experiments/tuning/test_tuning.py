@@ -76,6 +76,7 @@ def test_every_search_method_has_its_sampler_and_is_documented(name: str) -> Non
 
 @pytest.mark.usefixtures("certificates")
 @pytest.mark.parametrize("sampler", ["tpe", "random"])
+@pytest.mark.slow
 def test_resumed_search_equals_an_uninterrupted_one(tmp_path: Path, sampler: str) -> None:
     whole = searched(tuning(), tmp_path / "whole", sampler)
     searched(tuning(candidates=4), tmp_path / "stopped", sampler)
@@ -121,6 +122,7 @@ def test_candidate_with_a_failed_trial_is_not_chosen(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("certificates")
+@pytest.mark.slow
 def test_database_search_equals_journal_search_and_resumes(tmp_path: Path) -> None:
     whole, url = searched(tuning(candidates=5), tmp_path / "journal"), f"sqlite:///{tmp_path}/tune.db"
     searched(tuning(candidates=2, storage=url), tmp_path / "database")
@@ -228,6 +230,7 @@ def test_stability_of_lead_mode_is_unknown() -> None:
     assert cached_stability(run_config(mode="lead")).verdict == "unknown"
 
 
+@pytest.mark.slow
 def test_verdict_without_number_has_no_margin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HVF_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(governed, "governed_stability", lambda *given: Verdict("unknown", "no boundary was found"))

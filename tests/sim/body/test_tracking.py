@@ -82,6 +82,7 @@ def test_run_flies_without_residual():
     assert result.root_error_max <= 0.05
 
 
+@pytest.mark.slow
 def test_low_swinging_foot_is_not_taken_for_stance():
     # Backwards and slowly, the walk's heels skim the floor at 5 mm and 1 to 2 m/s.
     walk = embedded("walk")

@@ -52,6 +52,7 @@ def test_exceptions_of_the_function_are_raised() -> None:
         call()
 
 
+@pytest.mark.slow
 def test_arguments_live_exactly_as_long_as_the_call() -> None:
     into = np.zeros(3)
     reference = weakref.ref(into)

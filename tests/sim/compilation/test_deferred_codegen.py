@@ -80,6 +80,7 @@ def test_unit_has_no_undefined_symbols_and_its_parts_are_deferred():
     assert undefined_symbols(part.library._final_module)
 
 
+@pytest.mark.slow
 def test_results_equal_those_of_python():
     out, x = np.empty(2), np.array([0.3, 0.2, 0.5])
     njit(_combined.py_func)(x, out)

@@ -48,6 +48,7 @@ def test_comments_docstrings_and_unrelated_modules_leave_the_hash(tree: Path) ->
     assert hash_after_edit(tree, "controllers/safety/thermal.py", "\nAGAIN = 1\n") == before
 
 
+@pytest.mark.slow
 def test_hash_is_the_same_with_a_stored_corrupt_or_missing_cache_file(tree: Path) -> None:
     first = fresh_hash()
     (cache_file,) = (tree / "cache").rglob("code.json")

@@ -27,6 +27,7 @@ from tests.sim.hardware.emulation import (
 )
 
 
+@pytest.mark.slow
 def test_follow_through_a_driver_matches_simulation_within_1_mm() -> None:
     world = device_world()
     servo = bare_servo(world, simulated(world))
@@ -186,6 +187,7 @@ def test_encoder_offsets_are_subtracted_once_also_without_new_readings() -> None
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(12000.0, 0.5), (6000.0, 1.0)])
+@pytest.mark.slow
 def test_unstable_loop_is_damped_by_the_detector_and_still_guides(stiffness: float, damping: float) -> None:
     """Far beyond the certificate's boundary: without the detector the loop shakes the hand until it is too fast."""
     program = follow_program(stiffness, damping)

@@ -67,6 +67,7 @@ def test_unknown_kind_is_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", ["kinematic", "none"])
+@pytest.mark.slow
 def test_recording_without_physical_figure_is_measured_and_drawn(kind: str, tmp_path: Path) -> None:
     session = session_of(kind, 1.5, user="push")
     summary = record(session, tmp_path, to_dict(session.config), 1.5, time.perf_counter(), Console(quiet=True))

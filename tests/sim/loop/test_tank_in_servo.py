@@ -97,6 +97,7 @@ def delayed_spring(ticks):
 
 
 @pytest.mark.parametrize("make_law", [lambda: negative_damper, lambda: delayed_spring(25)], ids=["wrong sign", "late"])
+@pytest.mark.slow
 def test_active_law_injects_no_more_than_its_budget(make_law):
     tank = EnergyTank(1e-3, power=0.02, capacity=0.5, initial=0.02)
     config = run_config(clips=CLIPS, seconds=1.0, user="push", pushes=(Push(0.0, 0.1, 2.0),))

@@ -154,6 +154,7 @@ def test_rows_can_be_flushed_at_any_moment(tmp_path):
                 assert all(holds_row_numbers(channel) for channel in ticks.values())
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_run(tmp_path):
     """Fifty times as many rows cost a few megabytes more, not the hundred that they occupy."""
     script = """

@@ -57,6 +57,7 @@ def _bumped_phases(seconds: float) -> np.ndarray:
     return t + LEAD * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
+@pytest.mark.slow
 def test_push_along_the_river_does_not_speed_up_the_clip_which_catches_up(walk: RiverClips) -> None:
     played = _played(walk, _bumped_phases(5.0))
     after = slice(round(0.8 / PERIOD), None)

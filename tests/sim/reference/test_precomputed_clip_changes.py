@@ -65,6 +65,7 @@ def _played(clips: RiverClips, rivers: tuple[tuple[float, int], ...], seconds: f
     return poses, memory
 
 
+@pytest.mark.slow
 def test_change_begins_at_its_gate_ends_in_the_other_clip_without_jumps(map_with_changes: RiverClips) -> None:
     (change,) = map_with_changes.changes
     gate, begins = change.gates[0], 0.3

@@ -40,6 +40,7 @@ def test_force_arrow_starts_at_the_tip_and_points_along_the_force(page):
     assert not stage._arrows["user"].visible  # nobody pushes
 
 
+@pytest.mark.slow
 def test_lag_line_connects_the_stylus_to_its_target(page):
     stage = page._stage
     page.show(shown_state(stage._model, (0.0, 0.0, 0.0), target=(0.01, 0.0, 0.0)))
@@ -63,6 +64,7 @@ def test_clock_shows_the_time_of_the_shown_state(page):
     assert "12.34 s" in page._clock.content
 
 
+@pytest.mark.slow
 def test_camera_follows_a_travelling_figure_and_not_a_dancing_one(page):
     stage = page._stage
     stage.show(shown_state(stage._model))

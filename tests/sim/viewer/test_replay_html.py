@@ -141,6 +141,7 @@ def test_force_arrow_starts_at_the_stylus_with_length_proportional_to_the_force(
     assert State(content, 0.9).visible["/forces/user"] is False
 
 
+@pytest.mark.slow
 def test_replay_lasts_as_long_as_the_run_or_its_shown_part(tmp_path, model, monkeypatch):
     with record(tmp_path / "run.h5", model) as recording:
         content = decoded(replay_html(recording, model))
@@ -151,6 +152,7 @@ def test_replay_lasts_as_long_as_the_run_or_its_shown_part(tmp_path, model, monk
         assert decoded(replay_html(recording, model))["durationSeconds"] == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_travelling_figure_stays_in_view_while_the_floor_moves(tmp_path, model):
     with record(tmp_path / "run.h5", model, seconds=3.0, speed=1.5) as recording:
         content = decoded(replay_html(recording, model))

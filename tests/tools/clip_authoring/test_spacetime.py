@@ -74,6 +74,7 @@ def test_gauss_newton_gradient_matches_finite_differences():
     assert gradient @ direction == pytest.approx((costs[0] - costs[1]) / (2 * h), rel=0.03)
 
 
+@pytest.mark.slow
 def test_solve_lowers_the_cost_at_every_iteration_and_keeps_the_end_coordinates():
     motion = Motion(flights.task(flights.JUMP, flights.JUMP.weights))
     start, end = motion.coordinates(np.array([0.0, flights.JUMP.keys[-1].time - 1e-9]))

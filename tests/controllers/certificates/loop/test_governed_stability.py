@@ -1,5 +1,7 @@
 """Stability of a loop with a speed governor: certified, refuted, and unknown in between."""
 
+import pytest
+
 from controllers.certificates.loop.governed import governed_stability, max_drag
 from controllers.certificates.loop.hand import HandImpedance
 from controllers.certificates.loop.sampled_loop import SampledLoop
@@ -7,6 +9,7 @@ from controllers.certificates.loop.sampling import Sampling
 from tests.controllers.rivers_for_certificates import river
 
 
+@pytest.mark.slow
 def test_governor_drag_is_certified_by_circle_criterion_or_refuted_if_unstable():
     hands = [HandImpedance(), HandImpedance(0.1, 2.0, 100.0)]
     soft, hard, between = (governed_stability(river(), drag, hands) for drag in (8.0, 200.0, 45.0))

@@ -117,6 +117,7 @@ def test_linearised_tube_law_matches_finite_differences_of_the_kernels(kind):
         )
 
 
+@pytest.mark.slow
 def test_held_tube_is_certified_and_one_too_stiff_for_its_delay_refuted():
     hold = RIVER._replace(law=HOLD_LAW, k_r=150.0, b_d=2.0, width=np.inf)
     good = stability(hold, [NO_HAND, HandImpedance(0.1, 2.0, 200.0)])
@@ -131,6 +132,7 @@ def test_held_tube_is_certified_and_one_too_stiff_for_its_delay_refuted():
     assert seek.figures["critical_stiffness"].min() >= good.figures["critical_stiffness"].min() * (1.0 - 1e-6)
 
 
+@pytest.mark.slow
 def test_critical_stiffness_does_not_depend_on_the_requested_gain():
     hands = HandRange().hands()[::3]
     below = stability(RIVER, hands)

@@ -106,6 +106,7 @@ def test_no_common_function_for_a_hand_without_stiffness():
     assert held_common(rivers, meetings(rivers)[0], loose_hands, "smooth") is None
 
 
+@pytest.mark.slow
 def test_wide_hysteresis_at_a_shallow_crossing_is_certified_and_mujoco_keeps_the_hand():
     field = straight_pair(10.0, "discrete", 2.0, 8.0)
     retentions = _both_retentions(field, SLOW_FILTER)
@@ -128,6 +129,7 @@ def test_narrow_hysteresis_is_unknown_when_rounding_exceeds_it():
     assert verdict.figures["velocity_noise"] > field.hysteresis  # rounding alone outweighs it
 
 
+@pytest.mark.slow
 def test_hand_between_shallow_rivers_chatters_without_hysteresis():
     field = straight_pair(10.0, "discrete", 0.0)
     found = _found_counterexample(field, CLOCK, 0.0)
@@ -165,6 +167,7 @@ def test_hard_push_throws_the_hand_out_in_search_and_mujoco():
     assert ended.time == pytest.approx(found["time"], abs=0.05)
 
 
+@pytest.mark.slow
 def test_smooth_form_throws_the_hand_out_at_a_shallow_crossing():
     field = straight_pair(30.0, "smooth", 0.15)
     found = _found_counterexample(field, CLOCK, 0.0)

@@ -63,6 +63,7 @@ def test_energy_curvature_is_positive_semidefinite_where_sites_are_too_near():
     assert values[0] > -1e-12 * values[-1]
 
 
+@pytest.mark.slow
 def test_arrangement_does_not_depend_on_the_starts():
     """All of them reach the same energy: rounding, in which processors differ, cannot choose another minimum."""
     task, values = random_task(random_distances(), 1.0, 8.0), list[float]()

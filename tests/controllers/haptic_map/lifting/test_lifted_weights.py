@@ -106,6 +106,7 @@ def test_weights_are_bounded_and_hardly_negative_between_curves():
     assert -_MAX_PLANE_TERM < w.min() < -0.01
 
 
+@pytest.mark.slow
 def test_near_clips_are_those_whose_reach_contains_the_position():
     sites = moving_sites(40)
     weights, reach = Weights(sites), reaches(sites, R, Z)

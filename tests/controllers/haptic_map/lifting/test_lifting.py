@@ -37,6 +37,7 @@ def test_angles_increase_and_leave_a_gap_for_open_clips():
     assert np.abs(np.diff(step, 2)).max() < 0.02 * step.mean()
 
 
+@pytest.mark.slow
 def test_sites_stay_inside_and_apart():
     lifted = four_lifted()
     low, high = ROOM.rectangle.low, ROOM.rectangle.high
@@ -59,6 +60,7 @@ def test_reported_curve_figures_match_those_of_the_map():
         np.testing.assert_allclose(poses[:, 7:], m.poses[:, 7:], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_curves():
     lifted = four_lifted()
     again = lifted_at(FOUR)
@@ -67,6 +69,7 @@ def test_same_seed_gives_the_same_curves():
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_acceleration_limit_keeps_fast_clips_where_the_device_can_follow():
     # The fast clip lies between the other two; at the innermost radius its acceleration is 0.4 of that there.
     three = [motion(swinging(1, amplitude=a), f"{a}", fps=fps) for a, fps in ((0.2, 30.0), (0.4, 150.0), (0.6, 30.0))]
@@ -85,6 +88,7 @@ def test_clips_of_any_length_and_rate_are_lifted():
     assert found.after.separation >= ROOM.separation
 
 
+@pytest.mark.slow
 def test_duplicate_clips_are_reported_and_kept_apart():
     found = lifted_at([FOUR[0], motion(FOUR[0].poses, "again"), FOUR[1]])
     assert found.same == ((0, 1),)

@@ -95,6 +95,7 @@ def spans(ax):
     return [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
 
 
+@pytest.mark.slow
 def test_all_figures_are_drawn_into_a_new_folder(recording, tmp_path):
     files = draw_figures(recording, tmp_path / "run" / "figures")
     assert [file.name for file in files] == ["path.png", "deviation.png", "forces.png", "torques.png", "figure.png"]

@@ -96,6 +96,7 @@ def test_seed_and_versions_are_shown(write):
     assert f"numpy {np.__version__}" in text
 
 
+@pytest.mark.slow
 def test_remarks_before_a_run_are_in_its_summary_and_on_its_page(tmp_path, capsys) -> None:
     hvf.run(user="turn", figure="none", seconds=1.5, record=tmp_path / "turned")
     (remark,) = json.loads((tmp_path / "turned" / "summary.json").read_text())["remarks"]

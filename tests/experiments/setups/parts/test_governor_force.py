@@ -20,6 +20,7 @@ def backflip():
     return LedBackflip()
 
 
+@pytest.mark.slow
 def test_admissible_speeds_come_from_the_flight_of_the_clip(backflip):
     """By the clip's certificate, not by the map: σ |φ̇| in its flight, at the phases at which it flies."""
     clip = embedded("backflip")

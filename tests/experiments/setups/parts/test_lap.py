@@ -43,6 +43,7 @@ def test_default_lap_plays_a_file_at_its_own_pace(kind: str, slow_jump: str) -> 
     assert not any("times its recorded speed" in remark for remark in parts.remarks)
 
 
+@pytest.mark.slow
 def test_default_lap_of_rivers_is_one_of_a_round(slow_jump: str) -> None:
     config = run_config(mode="rivers", map="rivers", clips=(slow_jump, "jump"), seconds=1.0)
     assert lap(config) == pytest.approx(3.6)
@@ -57,6 +58,7 @@ def test_given_lap_and_laps_of_embedded_clips_stay(slow_jump: str) -> None:
     assert lap(run_config(map="robot-arm")) == 4.0
 
 
+@pytest.mark.slow
 def test_chosen_lap_is_said_and_a_given_one_is_not(slow_jump: str) -> None:
     config = run_config(figure="none", map="composite", clips=(slow_jump, "walk", "walk"), seconds=1.0)
     session = wire(config)

@@ -72,6 +72,7 @@ def test_interval_coverage_with_user_specific_effects() -> None:
     assert np.all(covered >= 19)
 
 
+@pytest.mark.slow
 def test_between_user_factor_is_compared_between_users() -> None:
     found = statistics(frame(-1.0, between=True), FACTORS, ("map",), ["tracking_error"], seed=3)
     (other,) = found.of("tracking_error", "map")
@@ -140,6 +141,7 @@ def test_two_trials_are_compared_without_an_interval() -> None:
     assert river.difference == pytest.approx(river.mean - river.reference_mean)
 
 
+@pytest.mark.slow
 def test_repetitions_do_not_count_as_users() -> None:
     # Users differ in what the river does to them; then the model's interval is the paired t test's, not a narrower one.
     from scipy.stats import ttest_rel
@@ -157,6 +159,7 @@ def test_repetitions_do_not_count_as_users() -> None:
 
 
 @pytest.mark.parametrize("seed", [2, 4, 10])
+@pytest.mark.slow
 def test_model_equals_paired_t_test_for_correlated_effects(seed: int) -> None:
     from scipy.stats import ttest_rel
 
@@ -178,6 +181,7 @@ def test_interaction_is_found_only_where_present() -> None:
     assert between["tracking_error"] > 0.05
 
 
+@pytest.mark.slow
 def test_failed_condition_does_not_bias_the_other_level() -> None:
     # Map b is 5 mm worse; users whose trials of it with the river failed must not bias the effect of the river.
     table = frame(0.0)
@@ -188,6 +192,7 @@ def test_failed_condition_does_not_bias_the_other_level() -> None:
     assert abs(river.difference) < 0.3
 
 
+@pytest.mark.slow
 def test_factor_name_may_equal_a_formula_function() -> None:
     table, renamed = frame(-1.0), frame(-1.0).rename(columns={"map": "C"})
     (found,) = statistics(table, FACTORS, (), ["tracking_error"], 1).of("tracking_error", "guidance")

@@ -27,6 +27,7 @@ def embracing():
 
 
 @pytest.mark.parametrize("allowed", [0.0, 0.02])
+@pytest.mark.slow
 def test_arm_is_no_deeper_in_the_trunk_than_allowed(embracing, allowed):
     schedule, overlap = stances(embracing, embracing), np.full(len(PARTS), allowed)
     assert depths(embracing.poses[:1])[0, ARM_IN_TRUNK] > 0.03
@@ -36,6 +37,7 @@ def test_arm_is_no_deeper_in_the_trunk_than_allowed(embracing, allowed):
     assert np.delete(apart, ARM_IN_TRUNK, axis=1).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_arm_that_moves_towards_the_trunk_comes_to_rest_outside_of_it(tmp_path):
     """A forearm that turns in at 6 rad/s would go 9 cm deep while its velocity decays."""
     n = 60
@@ -53,6 +55,7 @@ def test_arm_that_moves_towards_the_trunk_comes_to_rest_outside_of_it(tmp_path):
     assert depths(result.clip.poses).max() < 0.01
 
 
+@pytest.mark.slow
 def test_legs_of_a_jogging_capture_do_not_pass_through_each_other(mocap):
     """One leg passed 4.9 cm deep through the other; 1.1 cm as captured."""
     assert prepared(mocap / "cmu_amc" / "02_03.amc").fidelity.intrusions == ()

@@ -311,6 +311,19 @@ def test_transition_to_rest_keeps_the_knee_in_range_if_requested(walks):
     assert excess[1] < captured_excess + np.deg2rad(1.01)
 
 
+@pytest.mark.parametrize(("raised", "speed", "added"), [(0.0, 0.0, 0.0), (0.02, 0.0, 0.35), (0.0, 4.0, 0.35)])
+def test_end_that_stands_at_rest_gets_no_frames(raised, speed, added):
+    """A person who lifts an arm and stands still again; hovering by 2 cm, or with an arm that swings at the ends."""
+    times = np.linspace(0.0, 1.5, 181)
+    tangents = np.zeros((181, 57))
+    tangents[:, 6 + 3 * JOINTS.index("left_shoulder")] = np.sin(np.pi * times / 1.5) ** 4 + speed * times
+    poses = add_tangents(np.repeat(rest_pose()[None], 181, axis=0), tangents)
+    poses[:, 2] += raised + CONTACT_RADIUS - sole_points(rest_pose()[None])[0, :, 2].min()
+    found = close_or_rest(Clip(poses, 120.0, "lift"), "open")
+    assert -found.start == pytest.approx(added, abs=1e-9)
+    assert found.clip.n_frames == 181 + 2 * round(120 * added)
+
+
 def test_clip_that_ends_in_the_air_comes_to_rest_on_the_floor():
     jump = resampled(embedded("jump"), 120.0)
     flying = np.flatnonzero(sole_points(jump.poses)[:, :, 2].min(axis=1) > CONTACT_RADIUS + 0.05)

@@ -159,6 +159,7 @@ def test_existing_target_is_not_overwritten(tmp_path):
 
 
 @pytest.mark.parametrize(("degrees", "near"), [(10.0, True), (60.0, False)])
+@pytest.mark.slow
 def test_motion_with_a_joint_far_beyond_its_range_is_not_near_the_capture(degrees, near, monkeypatch, tmp_path):
     """As when a run cut at full speed comes to rest. Without a last step it is solved again, then left as captured."""
     attempts = []

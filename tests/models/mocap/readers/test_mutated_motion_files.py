@@ -54,6 +54,7 @@ def test_mutated_bvh_files_load_or_are_refused(tmp_path, content):
 
 @given(skeleton=mutations(ASF), content=mutations(AMC), which=st.sampled_from(("skeleton", "motion")))
 @FUZZ
+@pytest.mark.slow
 def test_mutated_amc_and_asf_files_load_or_are_refused(tmp_path, skeleton, content, which):
     (tmp_path / "m.asf").write_text(skeleton if which == "skeleton" else ASF, encoding="utf-8", errors="replace")
     (tmp_path / "m.amc").write_text(content if which == "motion" else AMC, encoding="utf-8", errors="replace")

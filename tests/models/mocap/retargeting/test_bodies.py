@@ -104,6 +104,7 @@ def test_coincident_copy_of_a_skeleton_is_dropped_with_a_remark(files, tmp_path)
     assert any(remark in line for line in loaded.report.notes())
 
 
+@pytest.mark.slow
 def test_one_person_on_a_random_rig_counts_as_one(tmp_path):
     """Twist joints, fingers, props, nodes above the hips and joints before the thighs are no second person."""
     walk = embedded("walk")
@@ -113,6 +114,7 @@ def test_one_person_on_a_random_rig_counts_as_one(tmp_path):
         assert len(people_hips(read_motion(tmp_path / "r.bvh"))) == 1, rig
 
 
+@pytest.mark.slow
 def test_captures_have_at_most_one_person(mocap):
     for path in sorted([*mocap.glob("*/*.bvh"), *mocap.glob("*_amc/*.amc")]):
         people = people_hips(read_motion(path))

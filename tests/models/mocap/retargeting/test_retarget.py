@@ -99,6 +99,7 @@ def test_knees_and_elbows_bend_in_human_directions(mocap, name):
         assert (sign * elbow[bent, 2] > -np.deg2rad(10)).all() or "snu/kick" in name, side
 
 
+@pytest.mark.slow
 def test_amc_and_bvh_of_one_motion_give_the_same_clip(mocap):
     """The first frame of the BVH is a rest pose, which is dropped."""
     amc, (bvh, report, _) = load(mocap / "cmu_amc/01_01.amc").clip, load(mocap / "cmu_amc/01_01.bvh")

@@ -158,6 +158,7 @@ def refused_whole_motions(refused):
     return [name for name, _ in refused if "from frame" not in name]
 
 
+@pytest.mark.slow
 def test_ten_random_rigs_give_the_same_motion(motions, compare):
     assert len(refused_whole_motions(refusals_of_random_rigs(10, 1, motions, compare))) <= 1
 
