@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import as_strided
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
 from scipy.linalg.blas import dsbmv  # pyright: ignore[reportAttributeAccessIssue]
@@ -255,16 +256,20 @@ class NormalEquations:
         return np.concatenate((cho_solve_banded((factor, True), inner - self.side @ last, check_finite=False), last))
 
     def _solve_side(self, factor: Array) -> Array:
-        """L⁻¹ times `side`, in blocks as wide as the band: three times as fast as LAPACK column by column."""
+        """L⁻¹ times `side`, in blocks as wide as the band: three times as fast as LAPACK column by column.
+
+        As columns are stored from the diagonal on, L_ij is at i + j (width − 1) in memory where it is within the band.
+        """
         width, solved = self._width, self.side.copy()
+        entries, above_diagonal = factor.ravel(order="F"), np.triu(np.ones((width, width)), 1)
+        strides = (entries.itemsize, entries.itemsize * (width - 1))
         for start in range(0, self._inner, width):
             rows = slice(start, min(start + width, self._inner))
-            columns = np.arange(max(0, start - width), rows.stop)
-            offsets = np.arange(start, rows.stop)[:, None] - columns
-            inside = (offsets >= 0) & (offsets < width)
-            lower = np.where(inside, factor[np.where(inside, offsets, 0), columns], 0.0)
-            split = start - int(columns[0])
-            if split:
-                solved[rows] -= lower[:, :split] @ solved[columns[0] : start]
-            solved[rows] = solve_triangular(lower[:, split:], solved[rows], lower=True, check_finite=False)
+            n = rows.stop - start
+            if start:
+                previous = slice(start - width, start)
+                beside = as_strided(entries[previous.start * width + width :], (n, width), strides, writeable=False)
+                solved[rows] -= (beside * above_diagonal[:n]) @ solved[previous]
+            diagonal = as_strided(entries[start * width :], (n, n), strides, writeable=False)
+            solved[rows] = solve_triangular(diagonal, solved[rows], lower=True, check_finite=False)
         return solved
