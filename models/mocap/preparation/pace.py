@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geometry.arrays import Array, rms
 from geometry.physics import GRAVITY
 from geometry.spans import spans
 from models.humanoid.skeleton import CONTACT_RADIUS, FOOT_CONTACTS, HAND_CONTACTS
@@ -47,24 +48,38 @@ class Paced(NamedTuple):
         Corrected rate over the file's.
     falls : float or None
         Downward acceleration in the file's flights [m/s²], if it has any.
+    departure : float
+        RMS distance of the heights in these flights from parabolas, relative to how far the parabolas bend, whatever
+        the frame rate.
     """
 
     clip: Clip
     pace: float
     falls: float | None
+    departure: float = 0.0
+
+
+class FlightFall(NamedTuple):
+    """Downward acceleration in the flights of a clip [m/s²], and their `Paced.departure`."""
+
+    acceleration: float
+    departure: float
 
 
 def correct_pace(clip: Clip) -> Paced:
     """The clip at the pace that makes its flights ballistic; unchanged within `MAX_FLIGHT_ACCELERATION_ERROR`."""
-    falls = flight_acceleration(clip)
-    if falls is None or falls < GRAVITY + MAX_FLIGHT_ACCELERATION_ERROR or falls > GRAVITY / _MIN_PACE**2:
-        return Paced(clip, 1.0, falls)
+    fall = flight_fall(clip)
+    if fall is None:
+        return Paced(clip, 1.0, None)
+    falls, departure = fall
+    if falls < GRAVITY + MAX_FLIGHT_ACCELERATION_ERROR or falls > GRAVITY / _MIN_PACE**2:
+        return Paced(clip, 1.0, falls, departure)
     pace = float(np.sqrt(GRAVITY / falls))
-    return Paced(Clip(clip.poses, clip.fps * pace, clip.name), pace, falls)
+    return Paced(Clip(clip.poses, clip.fps * pace, clip.name), pace, falls, departure)
 
 
-def flight_acceleration(clip: Clip) -> float | None:
-    """Downward acceleration of the centre of mass while neither feet nor hands are near the floor [m/s²]; or None.
+def flight_fall(clip: Clip) -> FlightFall | None:
+    """How the centre of mass falls while neither feet nor hands are near the floor; None if there is no such flight.
 
     Flights are found by heights alone, unlike in `contacts`, since all speeds depend on the rate in doubt. A body that
     is accelerated upwards in one stands on something, at whatever rate: on feet that hover, for example.
@@ -78,6 +93,16 @@ def flight_acceleration(clip: Clip) -> float | None:
     if not flights:
         return None
     height = momentum(clip).com[:, 2]
-    falls = np.array([-2.0 * np.polyfit(np.arange(b - a) / clip.fps, height[a:b], 2)[0] for a, b in flights])
+    falls, departures = np.array([_parabola(height[a:b], clip.fps) for a, b in flights]).T
     weights = np.where(falls > 0.0, [float(b - a) ** 4 for a, b in flights], 0.0)
-    return float(np.average(falls, weights=weights)) if weights.any() else None
+    if not weights.any():
+        return None
+    return FlightFall(float(np.average(falls, weights=weights)), float(np.average(departures, weights=weights)))
+
+
+def _parabola(heights: Array, fps: float) -> tuple[float, float]:
+    """Downward acceleration [m/s²] of the parabola nearest to heights (n,), and their `Paced.departure`."""
+    time = np.arange(len(heights)) / fps
+    parabola = np.polyfit(time, heights, 2)
+    bend = abs(parabola[0]) * time[-1] ** 2 / 4.0  # at its middle, from its chord
+    return -2.0 * parabola[0], rms(heights - np.polyval(parabola, time)) / max(bend, np.finfo(float).tiny)

@@ -30,6 +30,9 @@ _MAX_GAP_STEP_RATIO = 0.3  # largest step across a gap, as a fraction of the sma
 # At a turning point of a motion that is played forwards and backwards: least ratio of the step before it to the next
 # one (0.31 to 0.9 in two captures), and largest distance between before and after, relative to the former.
 _MIN_APPROACH_RATIO, _MAX_RETURN_RATIO = 0.3, 0.1
+# Largest step of a joint, relative to one beside it, with which a limb moves on: more is another pose, as in a cut
+# between two takes.
+MAX_STEP_RATIO = 2.0
 _MIN_JOINT_FRACTION = 0.25  # least fraction of the joints that jump at once if the whole pose jumps
 MIN_FRAME_COUNT = 10  # least number of frames that define usual steps
 _NEIGHBOUR_COUNT = 3  # frames on either side of a gap from which it is interpolated
@@ -102,9 +105,8 @@ def _without_gaps(motion: SourceMotion, roles: Roles) -> tuple[SourceMotion, Mas
     """The motion with short gaps interpolated, and the frames (n,) that were."""
     broken, used = np.zeros(motion.n_frames, dtype=bool), used_joints(motion, roles)
     longest = max(1, int(MAX_GAP_TIME * motion.fps))
-    lost, steps = motion.at_rest(used), _angles(motion.rotations[:-1, used], motion.rotations[1:, used]).max(axis=1)
-    edges = np.flatnonzero((lost[1:] != lost[:-1]) & (steps > _MIN_JUMP_ANGLE))
-    for before, last in pairwise(edges):
+    lost = motion.at_rest(used)
+    for before, last in pairwise(np.flatnonzero(_rest_jumps(lost, joint_steps(motion, roles)))):
         # Programs write zeros for a frame without data.
         broken[before + 1 : last + 1] = lost[before + 1 : last + 1].all() and last - before <= longest
     motion = interpolated(motion, broken)
@@ -125,8 +127,7 @@ def _remaining_jumps(motion: SourceMotion, roles: Roles) -> tuple[tuple[int, ...
     """Frames after which the whole pose or its place jumps, and the jumps of single joints at other times."""
     used, steps = used_joints(motion, roles), joint_steps(motion, roles)
     jumping = (steps > np.maximum(_jump_limits(steps, 2), _MIN_JUMP_ANGLE)).mean(axis=1) >= _MIN_JOINT_FRACTION
-    lost = motion.at_rest(used)
-    jumping |= (lost[1:] != lost[:-1]) & (steps.max(axis=1) > _MIN_JUMP_ANGLE)
+    jumping |= _rest_jumps(motion.at_rest(used), steps)
     root = root_positions(motion, roles)[:, 0]
     jumping |= _lasting_jumps(_distances(root[:-1], root[1:]), _MIN_ROOT_JUMP * thigh_length(motion, roles))
     single = np.argwhere(_lasting_jumps(steps, _MIN_JUMP_ANGLE) & ~jumping[:, None])
@@ -232,6 +233,17 @@ def thigh_length(motion: SourceMotion, roles: Roles) -> float:
 def _jump_limits(measures: Array, own: int) -> Array:
     """Bounds that measures exceed only in a gap; the `own` largest, which a gap itself causes, do not count."""
     return _MIN_JUMP_RATIO * np.quantile(np.sort(measures, axis=0)[:-own], 0.95, axis=0)
+
+
+def _rest_jumps(lost: Mask, steps: Array) -> Mask:
+    """Which steps (n − 1, joints) are jumps into or out of frames (n,) in the zero pose.
+
+    The zero pose may be one of the motion's own, as where its first frame was made the rest pose: then no joint turns
+    much further into it than in the step before, or out of it than in the step after.
+    """
+    zero = np.zeros_like(steps[:1])
+    outside = np.where(lost[1:, None], np.concatenate((zero, steps[:-1])), np.concatenate((steps[1:], zero)))
+    return (lost[1:] != lost[:-1]) & (steps > np.maximum(_MIN_JUMP_ANGLE, MAX_STEP_RATIO * outside)).any(axis=1)
 
 
 def _lasting_jumps(steps: Array, min_step: float) -> Mask:

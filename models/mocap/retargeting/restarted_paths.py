@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import Array, rms
-from models.mocap.retargeting.broken_frames import Repaired, joint_steps
+from models.mocap.retargeting.broken_frames import MAX_STEP_RATIO, Repaired, joint_steps
 from models.mocap.retargeting.skeleton_roles import Roles
 
-# Largest step of a joint across a leap [rad], or relative to the larger of its steps beside it: more is another pose,
-# as in a cut between two takes. The one capture of 357 that leaps has steps of 0 and 12°.
-_MAX_STEP, _MAX_STEP_RATIO = np.deg2rad(15.0), 2.0
+# Largest step of a joint across a leap that is no other pose whatever its steps beside it [rad]. The one capture of
+# 357 that leaps has steps of 0 and 12°.
+_MAX_STEP = np.deg2rad(15.0)
 
 
 def with_path_carried_on(repaired: Repaired, roles: Roles) -> Repaired:
@@ -50,10 +50,10 @@ def with_path_carried_on(repaired: Repaired, roles: Roles) -> Repaired:
 def _limbs_move_on(steps: Array, k: int) -> bool:
     """Whether no joint turns much further in a step than in those beside it."""
     beside = np.maximum(steps[k - 1], steps[k + 1])
-    return bool(np.all(steps[k] <= np.maximum(_MAX_STEP, _MAX_STEP_RATIO * beside)))
+    return bool(np.all(steps[k] <= np.maximum(_MAX_STEP, MAX_STEP_RATIO * beside)))
 
 
 def _limbs_share(steps: Array, k: int) -> float:
     """How far the joints turn in a step, relative to the mean of the steps beside it."""
     usual = (rms(steps[k - 1]) + rms(steps[k + 1])) / 2.0
-    return min(rms(steps[k]) / usual, _MAX_STEP_RATIO) if usual > 0.0 else 1.0
+    return min(rms(steps[k]) / usual, MAX_STEP_RATIO) if usual > 0.0 else 1.0

@@ -85,14 +85,14 @@ def test_two_frame_file_is_reported_as_mostly_rest(tmp_path):
     assert "the file's motion is 0.01 s; the rest is coming to rest at both ends, which is not in the file" in lines[1]
 
 
-def _made(falls: float | None, near: bool) -> Prepared:
+def _made(falls: float | None, near: bool, departure: float = 0.0) -> Prepared:
     """A walk as prepared from a capture that turns by 90° after 1.2 s, which its cycle does not."""
     clip = embedded("walk")
     looped = LoopedClip(clip, "cycle", 0.0, clip.duration, 0.0, LostTurn(np.pi / 2.0, 1.2))
     schedule = stances(clip, clip)
     tried = Attempt(looped, clip, schedule, clip, 0.0, RmsChange(0.0, 0.0, 0.0), near)
     return Prepared(
-        clip, clip, None, Paced(clip, 1.0, falls), 0.0, HandLoad(0.0, 0.0),
+        clip, clip, None, Paced(clip, 1.0, falls, departure), 0.0, HandLoad(0.0, 0.0),
         tried, fidelity(clip, clip, looped, 1.0), 0.0,
     )  # fmt: skip
 
@@ -101,9 +101,11 @@ def _looped(made: Prepared, looped: LoopedClip) -> Prepared:
     return made._replace(attempt=made.attempt._replace(cycle=looped))
 
 
-@pytest.mark.parametrize(("falls", "named"), [(0.5, True), (9.0, False), (None, False)])
-def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, named):
-    result = _made(falls, near=False)
+@pytest.mark.parametrize(
+    ("falls", "departure", "named"), [(0.5, 0.0, True), (0.5, 0.3, False), (9.0, 0.0, False), (None, 0.0, False)]
+)
+def test_slow_flights_lost_turns_and_left_out_events_are_reported(falls, departure, named):
+    result = _made(falls, near=False, departure=departure)
     looped = result.looped
     eventful = losses(_looped(result, looped._replace(left_out=(1.2, 4.5))))
     assert "1.2 s of the capture, the first at 4.50 s, are unlike the cycle: --loop open keeps them" in eventful

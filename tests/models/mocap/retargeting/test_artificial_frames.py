@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.formats import read_motion
+from models.mocap.retargeting.broken_frames import repair_frames
 from models.mocap.retargeting.retarget import _world_axes, retarget
 from models.mocap.retargeting.retarget_report import floor_remarks, two_digits
 from models.mocap.retargeting.skeleton_roles import roles_of
@@ -39,6 +40,20 @@ def test_rows_of_zeros_are_lost_frames_also_with_position_channels_on_every_join
     plain, placed = load(tmp_path / "False.bvh"), load(tmp_path / "True.bvh")
     assert largest_angle(plain.clip, placed.clip) < 0.1
     assert plain.report.remarks == placed.report.remarks
+
+
+def test_motion_that_passes_through_the_zero_pose_does_not_jump_there(tmp_path) -> None:
+    """A frame of the motion was made the rest pose of the rig, and begins the file twice."""
+    write_rig(Rig(), at_rate("run", 30.0), tmp_path / "r.bvh")
+    motion = read_motion(tmp_path / "r.bvh")
+    roles = roles_of(motion.joints, motion.parents)
+    rotations = Rotation.from_quat(motion.rotations, scalar_first=True)
+    rebased = (rotations[0].inv() * rotations).as_quat(scalar_first=True)
+    rebased = replace(motion, rotations=np.concatenate((rebased[:1], rebased)))
+    assert rebased.at_rest(range(len(motion.joints)))[:2].all()
+    rebased = replace(rebased, translations=np.concatenate((motion.translations[:1], motion.translations)))
+    repaired = repair_frames(rebased, roles)
+    assert repaired.jumps == repaired.frames == ()
 
 
 def test_floor_height_ignores_lost_frames(walk_rows) -> None:
