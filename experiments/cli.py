@@ -13,6 +13,7 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
+from dataclasses import fields
 from functools import reduce
 from importlib import import_module
 from importlib.metadata import version
@@ -201,7 +202,19 @@ def _shorten_message(message: str, words: Sequence[str]) -> str:
     )
     for pattern, better in rewordings:
         first = re.sub(pattern, better, first).rstrip(",")
-    return f"{first[0].lower()}{first[1:]}; hvf {command} --help lists the options"
+    more = f"hvf {command} --help lists the options"
+    if first.startswith("Unrecognized options: ") and (stated := _facts_about_a_file(words)):
+        first = first.partition("; perhaps ")[0]
+        more = f"hvf prepare takes {' and '.join(stated)}, and writes a BVH file for hvf {command}"
+    return f"{first[0].lower()}{first[1:]}; {more}"
+
+
+def _facts_about_a_file(words: Sequence[str]) -> list[str]:
+    """Options among the words that state facts about a motion file: remarks on files advise them to all commands."""
+    from models.mocap.retargeting.hints import Hints  # imported late: it loads NumPy
+
+    known = {"--" + field.name.replace("_", "-") for field in fields(Hints)}
+    return [option for word in words if (option := word.split("=")[0]) in known]
 
 
 def _suggestion(lines: Sequence[str]) -> str:

@@ -39,6 +39,10 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
         (["--tyro-print-completion", "tcsh"], "--tyro-print-completion is 'tcsh'; expected bash, zsh, fish"),
         (["run", "--tyro-print-completion"], "--tyro-print-completion is ''; expected bash, zsh, fish"),
         (["run", "--bogus", "1"], "unrecognized options: --bogus, 1; hvf run --help"),
+        (
+            ["run", "--up", "-X"],
+            "unrecognized options: --up=-X; hvf prepare takes --up, and writes a BVH file for hvf run",
+        ),
         (["certify", "--no-no-hand"], "unrecognized options: --no-no-hand"),
         (["run", "--no-governor"], "unrecognized options: --no-governor"),
         (["run", "--stifness", "3"], "--stifness, 3; perhaps --stiffness is meant; hvf run --help lists the options"),
