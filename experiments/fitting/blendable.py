@@ -45,7 +45,9 @@ def not_blendable(clips: Sequence[Clip]) -> tuple[str, ...]:
             fault = f"turns over (pelvis {np.rad2deg(np.arccos(clip.min_pelvis_cosine)):.0f}° from upright)"
             lines.append(f"{clip.name} {fault}: it cannot be blended with others")
         elif flight > MAX_FLIGHT_TIME:
-            lines.append(f"{clip.name} flies for {flight:.2f} s: it cannot be blended with what stays on the floor")
+            lines.append(
+                f"{clip.name} is off the floor for {flight:.2f} s: it cannot be blended with what stays on the floor"
+            )
     return tuple(lines)
 
 

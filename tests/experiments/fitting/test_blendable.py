@@ -28,7 +28,7 @@ def test_clips_that_turn_over_or_fly_are_reported() -> None:
     remarks = not_blendable((walk, flip, jump))
     assert len(remarks) == 2
     assert remarks[0].startswith("backflip turns over")
-    assert remarks[1].startswith("jump flies for 0.")
+    assert remarks[1].startswith("jump is off the floor for 0.")
 
 
 def test_clip_whose_wrist_goes_round_is_reported_and_one_whose_knee_does_or_that_raises_an_arm_is_not() -> None:
@@ -73,7 +73,7 @@ def test_lap_is_timed_by_the_first_grounded_clip() -> None:
 def test_map_remarks_name_flying_and_off_pace_clips() -> None:
     config = run_config(map="composite", mode="follow", clips=("walk", "jump", "walk"), lap=1.2, seconds=1.0)
     flies, paced = map_parts(config, figure_model()).remarks
-    assert flies.startswith("jump flies for 0.")
+    assert flies.startswith("jump is off the floor for 0.")
     assert paced.startswith("a lap of 1.2 s plays jump at 2.00 times its recorded speed")
 
 
