@@ -11,10 +11,11 @@ import numpy as np
 
 from models.errors import ModelError
 from models.humanoid.skeleton import HAND_CONTACTS
-from models.mocap.library import load
+from models.mocap.library import Loaded, load
 from models.mocap.motion.clip import Clip
 from models.mocap.motion.kinematics import contact_points
 from models.mocap.preparation.attempt import Attempt, attempt, unchanged
+from models.mocap.preparation.closing_frame import with_closing_frame
 from models.mocap.preparation.fidelity import Fidelity, fidelity
 from models.mocap.preparation.looping import LoopedClip, close_or_rest
 from models.mocap.preparation.pace import Paced, correct_pace
@@ -26,6 +27,9 @@ from models.one_blas_thread import on_one_blas_thread
 
 FPS = 120.0  # frame rate of prepared clips [1/s], as CMU's: slower captures need it for the detail that is added
 _MAX_DURATION = 120.0  # [s]: longer captures were not tried; of a cyclic one, a single lap is prepared
+_CLOSING_REMARK = (
+    "the motion goes on from its last frame to its first, as a lap without its closing frame: it is appended"
+)
 
 
 class HandLoad(NamedTuple):
@@ -51,7 +55,7 @@ class Prepared(NamedTuple):
     clip : Clip
         The result.
     captured : Clip
-        The capture as retargeted to the figure and put on the floor.
+        The capture as retargeted to the figure and put on the floor, with the closing frame of a lap that lacks it.
     report : RetargetReport or None
         How the file was interpreted; None for a file on the figure's own skeleton.
     paced : Paced
@@ -118,7 +122,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     """
     began = process_time()
     loaded = load(path, hints)
-    captured = loaded.clip
+    captured, report = _completed(loaded) if loop == "auto" else (loaded.clip, loaded.report)
     if captured.n_frames < 2:
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_MAX_DURATION:.0f} s")
     if captured.fps < MIN_FRAME_RATE and captured.duration > _MAX_DURATION:
@@ -132,7 +136,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
             f"{path}: {frames}; expected 1/{FPS:g} s at least: a Frame Time in seconds, such as {1.0 / 30.0:.4f}, or "
             "--frame-rate"
         )
-    kept = unchanged(even_clip) if loaded.report is None and loop == "auto" and not mirror else None
+    kept = unchanged(even_clip) if report is None and loop == "auto" and not mirror else None
     tried = kept or _nearest(path, even_clip, loop, loaded.loops, mirror)
     cycle, near = tried.cycle, tried.near
     carried = float(np.linalg.norm((tried.planted.poses - cycle.clip.poses)[:, :2], axis=1).max()) if near else 0.0
@@ -141,7 +145,15 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     distance = fidelity(clip, captured, cycle, timed.pace)
     bears = near and tried.schedule.hands.any()
     hands = _hand_load(tried.planted, tried.schedule) if bears else HandLoad(0.0, 0.0)
-    return Prepared(clip, captured, loaded.report, timed, carried, hands, tried, distance, process_time() - began)
+    return Prepared(clip, captured, report, timed, carried, hands, tried, distance, process_time() - began)
+
+
+def _completed(loaded: Loaded) -> tuple[Clip, RetargetReport | None]:
+    """A capture, with the closing frame of a lap that lacks it, and how it was interpreted."""
+    captured, report = loaded.clip, loaded.report
+    if report is None or (completed := with_closing_frame(captured)) is captured:
+        return captured, report
+    return completed, report._replace(remarks=(*report.remarks, _CLOSING_REMARK))
 
 
 def _nearest(path: Path, clip: Clip, loop: str, wraps: bool | None, mirror: bool) -> Attempt:
