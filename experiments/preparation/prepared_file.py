@@ -211,8 +211,8 @@ def losses(prepared: Prepared) -> tuple[str, ...]:
     if (turn := np.rad2deg(part.lost_turn.angle)) > _MAX_LOST_TURN:
         what = f"at {part.lost_turn.at:.2f} s the capture has turned {turn:.0f}° further than its cycle ever does"
         lines.append(f"{what}: --loop open keeps its turns")
-    slow = pace == 1.0 and falls is not None and 0.0 < falls < _MAX_SLOW_FALL
-    if slow and departure < _MAX_DEPARTURE and not prepared.hands.seconds:
+    unsupported = pace == 1.0 and departure < _MAX_DEPARTURE and not prepared.hands.seconds
+    if unsupported and falls is not None and 0.0 < falls < _MAX_SLOW_FALL:
         rate = prepared.captured.fps * float(np.sqrt(GRAVITY / falls))
         lines.append(
             f"its flights fall at {two_digits(falls)} m/s², and would fall freely at {rate:.0f} frames a second: "
