@@ -85,3 +85,4 @@ def test_motion_file_of_unsupported_format_is_refused(tmp_path: Path, capsys: py
     shutil.copy(WALK, tmp_path / "walk.fbx")
     stderr = refused(["convert", str(tmp_path / "walk.fbx"), str(tmp_path / "out.bvh")], capsys)
     assert "walk.fbx: .fbx files are not read; expected BVH, AMC (with its ASF beside it) or DeepMimic JSON" in stderr
+    assert "Blender imports it and exports BVH" in stderr

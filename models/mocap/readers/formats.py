@@ -44,6 +44,7 @@ READABLE = (
 )
 WRITABLE = (BVH, GLTF)
 _TEXT_SUFFIXES = (".txt", ".json")  # suffixes that do not determine the format, as none does not
+_BLENDER_SUFFIXES = (".glb", ".gltf", ".fbx")  # not read, but Blender converts them
 READABLE_SUFFIXES = (*(kind.suffix for kind in READABLE if kind.suffix), *_TEXT_SUFFIXES)
 UPLOADABLE_SUFFIXES = (*READABLE_SUFFIXES, SKELETON_SUFFIX)
 *_FIRST, _LAST = (kind.name + kind.addition for kind in READABLE)
@@ -68,5 +69,6 @@ def read_motion(path: Path) -> SourceMotion:
         found = next((kind.read for kind in READABLE if suffix == kind.suffix), None)
         line, what = 0, f"{suffix} files are not read"
     if found is None:
-        raise MotionFileError(path, line, what, READABLE_NAMES)
+        how = "; Blender imports it and exports BVH" if suffix in _BLENDER_SUFFIXES else ""
+        raise MotionFileError(path, line, what, READABLE_NAMES + how)
     return found(path)
