@@ -122,7 +122,7 @@ def prepared(path: Path, loop: str = "auto", mirror: bool = False, hints: Hints 
     """
     began = process_time()
     loaded = load(path, hints)
-    captured, report = _completed(loaded) if loop == "auto" else (loaded.clip, loaded.report)
+    captured, report = _completed(loaded) if loop in ("auto", "lap") else (loaded.clip, loaded.report)
     if captured.n_frames < 2:
         raise ModelError(f"{path}: a single frame; expected a motion of two frames to {_MAX_DURATION:.0f} s")
     if captured.fps < MIN_FRAME_RATE and captured.duration > _MAX_DURATION:

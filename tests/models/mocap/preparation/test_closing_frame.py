@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from models.mocap.library import embedded
+from models.mocap.library import embedded, load
 from models.mocap.motion.clip import Clip, PlanarDisplacement
 from models.mocap.preparation.closing_frame import with_closing_frame
+from models.mocap.preparation.prepare import prepared
+from tests.models.mocap.retargeting.rigs import Rig, write_rig
 
 
 def _lap(name: str, turn: float = 0.0) -> Clip:
@@ -34,3 +36,14 @@ def test_other_motions_are_left_as_they_are(left_out):
     assert with_closing_frame(part) is part
     still = Clip(np.repeat(lap.poses[:1], 30, axis=0), 30.0, "still")
     assert with_closing_frame(still) is still
+
+
+@pytest.mark.slow
+def test_file_that_lacks_it_is_prepared_as_one_cycle_and_says_so(tmp_path):
+    lap = _lap("walk")
+    write_rig(Rig(), Clip(lap.poses[:-1], lap.fps, "walk"), tmp_path / "r.bvh")
+    made = prepared(tmp_path / "r.bvh")
+    assert made.looped.kind == "cycle"
+    assert made.looped.end - made.looped.start == pytest.approx(lap.duration, abs=0.02)
+    assert any("its closing frame: it is appended" in line for line in made.report.remarks)
+    assert len(load(tmp_path / "r.bvh").clip.poses) == made.captured.n_frames - 1
