@@ -43,6 +43,18 @@ def test_root_deviation_does_not_align_paths_by_turning_the_body():
     assert result.root == pytest.approx(0.2 / np.sqrt(2.0), rel=1e-2)
 
 
+@pytest.mark.parametrize(("part", "root"), [(1.0, 0.0), (0.5, 0.25)])
+def test_uniform_travel_given_back_to_a_gait_in_place_is_no_deviation(walk, part, root):
+    """On a treadmill; where only a part of the travel was taken out, the rest of the path counts."""
+    treadmill, times = walk.poses.copy(), np.linspace(0.0, 1.0, walk.n_frames)
+    travel = walk.displacement
+    treadmill[:, :2] -= part * np.outer(times, (travel.x, travel.y))
+    result = fidelity(walk, Clip(treadmill, walk.fps, "treadmill"), as_one_cycle(walk), 1.0)
+    length = np.hypot(travel.x, travel.y)
+    assert result.gait
+    assert result.root == pytest.approx(root * length / np.sqrt(3.0), rel=0.03, abs=0.01)
+
+
 def test_joint_with_the_largest_deviation_is_the_first_extreme(walk):
     poses, knee = walk.poses.copy(), JOINTS.index("left_knee")
     columns = slice(7 + 4 * knee, 11 + 4 * knee)
