@@ -21,8 +21,8 @@ MAX_GAIT_JOINT_DISTANCE, MAX_JOINT_DISTANCE, MAX_ROOT_DISTANCE = np.deg2rad(3.0)
 _HEADING_LEVER = 0.7
 _Y_AXIS = np.array([0.0, 1.0, 0.0])
 _LISTED_COUNT = 5  # number of joints in `Fidelity.extremes`
-# Extent of a capture's path, relative to its clip's, below which a gait was captured in place: at most 0.11 in nine gaits
-# from web pages, 0.96 to 1.03 in another and in those of docs/validation/prepared-captures.md.
+# Extent of a capture's path, relative to its clip's, below which a gait was captured in place: at most 0.11 in nine
+# gaits from web pages, 0.96 to 1.03 in another and in those of docs/validation/prepared-captures.md.
 _MAX_IN_PLACE_EXTENT = 0.25
 _MIN_GAIT_TRAVEL = 0.4  # displacement of a lap beyond which a closed clip that does not turn over is a gait [m]
 
