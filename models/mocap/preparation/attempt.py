@@ -18,7 +18,7 @@ from models.mocap.preparation.bounds import MAX_RESIDUAL, MAX_RESIDUAL_IN_FLIGHT
 from models.mocap.preparation.feasible import feasible
 from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.poses import smoothed
-from models.mocap.preparation.root_path import without_foot_sliding
+from models.mocap.preparation.root_path import shifted_over_floor, without_foot_sliding
 from models.mocap.preparation.stances import Stances, stances, with_feet_at_rest
 from models.mocap.preparation.well_formed import well_formed
 
@@ -97,7 +97,7 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
         calm = smoothed(planted)
         schedule = with_feet_at_rest(stances(planted, calm), planted)
         result = feasible(calm, schedule, fps=fps, overlap=overlap)
-        change = _rms_change(_shifted(start, shift), result.clip)
+        change = _rms_change(shifted_over_floor(start, shift), result.clip)
         near = (
             change.turned < _MAX_ROTATION_CHANGE
             and change.raised < _MAX_HEIGHT_CHANGE
@@ -107,7 +107,9 @@ def attempt(cycle: LoopedClip, captured: Clip, fps: float) -> Attempt:
         excess = _contact_excess(result.clip)
         if last is not None and (not near or np.all(excess > _MIN_IMPROVEMENT * before)):
             break
-        last = Attempt(cycle, _shifted(cycle.clip, shift), schedule, result.clip, result.residual, change, near)
+        last = Attempt(
+            cycle, shifted_over_floor(cycle.clip, shift), schedule, result.clip, result.residual, change, near
+        )
         # From a motion that is not near, passes lead away: a roll floated over the floor, 27° from the capture.
         if not near or np.all(excess <= 1.0):
             break
@@ -124,12 +126,6 @@ def unchanged(clip: Clip) -> Attempt | None:
     cycle = LoopedClip(clip, "cycle" if measures.closed else "open", 0.0, clip.duration, 0.0)
     schedule = stances(clip, smoothed(clip))
     return Attempt(cycle, clip, schedule, clip, measures.residual, RmsChange(0.0, 0.0, 0.0), True)
-
-
-def _shifted(clip: Clip, shift: Array) -> Clip:
-    poses = clip.poses.copy()
-    poses[:, :2] += shift
-    return Clip(poses, clip.fps, clip.name)
 
 
 def _rms_change(start: Clip, end: Clip) -> RmsChange:

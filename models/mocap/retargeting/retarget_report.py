@@ -277,7 +277,7 @@ def in_place_remarks(path: Array, ankles: Array, fps: float) -> Iterator[str]:
         remark = (
             f"the lower foot slides at {two_digits(speed)} m/s or more half of the time, while the hips stay in place"
         )
-        travel = "if the body's travel was taken out, hvf prepare gives it back as far as feet stand"
+        travel = "if the body's travel was taken out, hvf prepare gives it back"
         yield f"{remark} (within {extent:.2f} m): {travel}"
 
 

@@ -35,3 +35,15 @@ def test_body_sliding_over_the_floor_under_load_is_held_by_its_feet():
 def test_clip_whose_feet_rest_under_load_keeps_its_path(name: str):
     clip = resampled(embedded(name), FPS)
     assert without_foot_sliding(clip, smoothed(clip)) is clip
+
+
+@pytest.mark.parametrize("name", ["walk", "run"])
+def test_gait_in_place_gets_its_travel_back_also_in_flights(name: str):
+    gait = resampled(embedded(name), FPS)
+    poses, travel = gait.poses.copy(), gait.poses[-1, :2] - gait.poses[0, :2]
+    poses[:, :2] -= np.linspace(0.0, 1.0, gait.n_frames)[:, None] * travel
+    treadmill = Clip(poses, FPS, "treadmill")
+    returned = without_foot_sliding(treadmill, smoothed(treadmill))
+    np.testing.assert_allclose(
+        returned.poses[-1, :2] - returned.poses[0, :2], travel, atol=0.03 * np.linalg.norm(travel)
+    )
