@@ -23,7 +23,7 @@ _Y_AXIS = np.array([0.0, 1.0, 0.0])
 _LISTED_COUNT = 5  # number of joints in `Fidelity.extremes`
 # Extent of a capture's path, relative to its clip's, below which a gait was captured in place: at most 0.11 in nine
 # gaits from web pages, 0.96 to 1.03 in another and in those of docs/validation/prepared-captures.md.
-_MAX_IN_PLACE_EXTENT = 0.25
+_MAX_EXTENT_RATIO = 0.25
 _MIN_GAIT_TRAVEL = 0.4  # displacement of a lap beyond which a closed clip that does not turn over is a gait [m]
 
 
@@ -168,7 +168,7 @@ def _root_distances(clip_poses: Array, capture_poses: Array, gait: bool) -> Arra
     paths of a gait that was captured in place are compared without their mean velocities.
     """
     extents = [float(np.hypot(*np.ptp(poses[:, :2], axis=0))) for poses in (clip_poses, capture_poses)]
-    degree, frames = int(gait and extents[1] < _MAX_IN_PLACE_EXTENT * extents[0]), np.arange(len(clip_poses))
+    degree, frames = int(gait and extents[1] < _MAX_EXTENT_RATIO * extents[0]), np.arange(len(clip_poses))
     places, left = [], []
     for poses in (clip_poses, capture_poses):
         place = poses[:, :2] @ (1, 1j)
