@@ -5,7 +5,7 @@ They are, at sampled instants,
 - the residual wrench at the centre of mass, r = w − A f*, with f* the contact forces that best produce the required
   wrench w (`floor_forces`; variable projection, Golub & Pereyra 1973), weighted more in flight, where f* = 0;
 - the displacement of standing contact spheres from their places (foot skate), with a weight that fades out beside the
-  stance, and the depth of the others below the floor;
+  stance, and of sliding ones from where they were captured, and the depth of the others below the floor;
 - the excess over joint limits (its cost is linear) and joint torques beyond three quarters of their limits;
 - how much deeper limbs are in each other or in the trunk than in the capture.
 """
@@ -42,9 +42,8 @@ DYNAMIC_COUNT = TORQUE_COUNT + 6  # number of the first errors, torques and wren
 class FeasibleWeights:
     """Weights of the errors before squaring, per sampled instant.
 
-    Chosen on three walks and a run of the tuning half (`docs/validation/preparation-choices.md`). The jerk's weight
-    matters: with a smaller one, two walks need 21 and 9 % of body weight instead of 7 and 5 %; with 5e-5 the figure
-    stays up in the run.
+    Those of height, leg, ankle, jerk and strain were chosen on captures of the tuning half, the others on three walks
+    and a run of it (`docs/validation/preparation-choices.md#the-feasible-motion`).
 
     Parameters
     ----------
@@ -60,8 +59,8 @@ class FeasibleWeights:
         Excess of a rotation vector over its limits [1/rad].
     strain : float
         Excess of a joint torque over three quarters of its limit, as a fraction of the limit.
-    place, root, spine, head, arm, leg, ankle : float
-        Change of the root's position [1/m], and of rotations [1/rad].
+    place, height, root, spine, head, arm, leg, ankle : float
+        Change of the root's position over the floor and of its height [1/m], and of rotations [1/rad].
     sway, jerk : float
         Third derivative of the change of the root's position [s³/m] and of rotations [s³/rad].
     """
@@ -73,23 +72,24 @@ class FeasibleWeights:
     depth: float = 600.0
     overlap: float = 100.0
     limit: float = 100.0
-    strain: float = 10.0
+    strain: float = 20.0
     place: float = 1.0
+    height: float = 30.0
     root: float = 8.0
     spine: float = 6.0
     head: float = 8.0
     arm: float = 4.0
-    leg: float = 3.0
-    ankle: float = 2.0
+    leg: float = 6.0
+    ankle: float = 4.0
     sway: float = 3e-3
-    jerk: float = 3e-4
+    jerk: float = 1.5e-4
 
     def tracking(self) -> Array:
         """Weights of the change, shape (57,)."""
         kinds = {"abdomen": self.spine, "chest": self.spine, "head": self.head}
         parts = {"hip": self.leg, "knee": self.leg, "ankle": self.ankle}
         joints = [kinds.get(joint) or parts.get(joint.split("_")[-1]) or self.arm for joint in JOINTS]
-        return np.repeat([self.place, self.root, *joints], 3)
+        return np.concatenate(((self.place, self.place, self.height), np.repeat([self.root, *joints], 3)))
 
 
 class Errors(NamedTuple):

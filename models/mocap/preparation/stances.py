@@ -4,7 +4,7 @@ Heel and toes of a foot stand by the rule for all contacts (`standing_parts`); e
 floor, or stands on one sphere while it turns (`foot_places`). Where nothing stands although the centre of mass
 accelerates as if under load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the
 stance came before and on the lower part of the foot if it comes after. Without such a stance the lowest part of the
-feet bears load while sliding; `root_path` removes most such cases beforehand. An open clip with an upright end rests
+feet bears load while it slides as captured; `root_path` removes most such cases beforehand. An open clip with an upright end rests
 there on both feet: captures may be cut anywhere, but nobody can rest on the toes of one foot. Hands are in the schedule
 only of clips in which they bear load (`hand_stances`).
 """
@@ -61,12 +61,12 @@ class Stances(NamedTuple):
     pushing : array of bool, shape (n, k)
         Whether it may bear load.
     places : array, shape (n, k, 3)
-        Target centres of standing spheres [m], on the floor.
+        Target centres of standing spheres [m], on the floor; of sliding ones below where they were captured.
     sliding : array of bool, shape (n, k)
         Whether it is on the floor and under load, but not at rest.
     kept : array, shape (n, k)
-        Weight with which a sphere is held at its place over the floor: 1 in stance, falling to 0 before and after it
-        while another sphere stands.
+        Weight with which a sphere is held at its place over the floor: 1 in stance and while it slides, falling to 0
+        before and after a stance while another sphere stands.
     """
 
     standing: Mask
@@ -130,9 +130,11 @@ def stances(clip: Clip, smooth: Clip) -> Stances:
     # In frames under load in which nothing else may bear it, standing spheres bear load without the lag.
     unsupported = ~pushing.any(axis=1) & (load > MIN_LOAD)
     pushing[unsupported] |= standing[unsupported]
-    kept = _hold_weights(standing, places, round(_HOLD_FADE_TIME * fps))
+    sliding &= ~standing
+    kept = _hold_weights(standing, sliding, places, round(_HOLD_FADE_TIME * fps))
+    places[sliding, :2] = points[sliding, :2]
     frames = slice(first, first + clip.n_frames)
-    return Stances(standing[frames], pushing[frames], places[frames], sliding[frames] & ~standing[frames], kept[frames])
+    return Stances(standing[frames], pushing[frames], places[frames], sliding[frames], kept[frames])
 
 
 def sliding_spheres(poses: Array, calm: Array, fps: float) -> Mask:
@@ -178,7 +180,8 @@ def with_feet_at_rest(schedule: Stances, clip: Clip) -> Stances:
             result.places[frames, spheres] = place
             result.standing[frames, spheres] = result.pushing[frames, spheres] = True
             result.sliding[frames, spheres] = False
-    return result._replace(kept=_hold_weights(result.standing, result.places, round(_HOLD_FADE_TIME * clip.fps)))
+    width = round(_HOLD_FADE_TIME * clip.fps)
+    return result._replace(kept=_hold_weights(result.standing, result.sliding, result.places, width))
 
 
 def clearance(schedule: Stances, fps: float, closed: bool) -> Array:
@@ -271,7 +274,7 @@ def _extend_stance(points: Array, parts: Mask, start: int, end: int) -> None:
             return
 
 
-def _hold_weights(standing: Mask, places: Array, width: int) -> Array:
+def _hold_weights(standing: Mask, sliding: Mask, places: Array, width: int) -> Array:
     """Weights with which spheres are held at their places; `places` are extended over the frames beside stances."""
     weights = standing.astype(np.float64)
     for sphere in range(standing.shape[1]):
@@ -284,6 +287,7 @@ def _hold_weights(standing: Mask, places: Array, width: int) -> Array:
     # A foot that takes off into a flight or lands from one is not held: otherwise the figure fell in a backflip and a
     # kick.
     weights[~standing.any(axis=1)] = 0.0
+    weights[sliding] = 1.0
     return weights
 
 

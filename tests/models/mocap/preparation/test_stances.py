@@ -73,6 +73,19 @@ def test_place_weight_is_zero_in_flight(hop):
     assert (schedule.kept[flies] == 0.0).all()
 
 
+def test_feet_that_slide_under_load_are_kept_where_they_were_captured():
+    still = resampled(embedded("cheer"), 120.0).poses[0]
+    poses = np.repeat(still[None], 120, axis=0)
+    poses[:, 0] += 1.5 * np.arange(120) / 120.0  # [m], in a second
+    slides = Clip(poses, 120.0, "slides")
+    schedule = with_feet_at_rest(stances(slides, slides), slides)
+    middle = slice(30, 90)
+    assert schedule.sliding[middle].all()
+    np.testing.assert_array_equal(schedule.kept[middle], 1.0)
+    np.testing.assert_allclose(schedule.places[middle, :, :2], sole_points(poses)[middle, :, :2], atol=1e-12)
+    np.testing.assert_array_equal(schedule.places[middle, :, 2], CONTACT_RADIUS)
+
+
 def test_mean_load_of_a_walk_is_the_body_weight(walks):
     walk = walks[0]
     loads = contact_forces(walk, stances(walk, walk)).loads.sum(axis=1)
