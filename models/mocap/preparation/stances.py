@@ -4,9 +4,9 @@ Heel and toes of a foot stand by the rule for all contacts (`standing_parts`); e
 floor, or stands on one sphere while it turns (`foot_places`). Where nothing stands although the centre of mass
 accelerates as if under load, the capture skates or hovers: a neighbouring stance is then extended, on the toes if the
 stance came before and on the lower part of the foot if it comes after. Without such a stance the lowest part of the
-feet bears load while it slides as captured; `root_path` removes most such cases beforehand. An open clip with an upright end rests
-there on both feet: captures may be cut anywhere, but nobody can rest on the toes of one foot. Hands are in the schedule
-only of clips in which they bear load (`hand_stances`).
+feet bears load while it slides as captured; `root_path` removes most such cases beforehand. An open clip with an
+upright end rests there on both feet: captures may be cut anywhere, but nobody can rest on the toes of one foot. Hands
+are in the schedule only of clips in which they bear load (`hand_stances`).
 """
 
 from typing import NamedTuple

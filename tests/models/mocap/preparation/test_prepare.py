@@ -87,8 +87,9 @@ def test_preparation_of_a_captured_dance_lets_feet_turn(mocap, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "deepmimic/humanoid3d_walk.txt", "snu/walk.bvh", "xia/dme_example.bvh"]
-)  # fmt: skip
+    "name",
+    ["cmu_amc/02_01.amc", "cmu_amc/02_03.amc", "deepmimic/humanoid3d_walk.txt", "snu/walk.bvh", "xia/dme_example.bvh"],
+)
 def test_prepared_gaits_are_within_3_degrees_and_5_cm_of_their_captures(mocap, name):
     near = prepared(mocap / name).fidelity
     assert near.gait
@@ -97,7 +98,7 @@ def test_prepared_gaits_are_within_3_degrees_and_5_cm_of_their_captures(mocap, n
 
 @pytest.mark.slow
 def test_a_leg_is_as_near_to_its_capture_as_an_arm(mocap):
-    """With weights of 3 and 2 on legs and ankles, and 1 on height, joints are 3.7°, the root 2.1 cm from the capture."""
+    """With half the weights on legs and ankles, and none on height, joints are 3.7°, the root 2.1 cm from the capture."""
     near = prepared(mocap / "cmu_amc/02_03.amc").fidelity
     assert np.rad2deg(near.joints) < 2.8
     assert near.root < 0.013
