@@ -98,7 +98,7 @@ def test_prepared_gaits_are_within_3_degrees_and_5_cm_of_their_captures(mocap, n
 
 @pytest.mark.slow
 def test_a_leg_is_as_near_to_its_capture_as_an_arm(mocap):
-    """With half the weights on legs and ankles, and none on height, joints are 3.7°, the root 2.1 cm from the capture."""
+    """With half the weights on legs and ankles, and none on height, they are 3.7°, the root 2.1 cm from it."""
     near = prepared(mocap / "cmu_amc/02_03.amc").fidelity
     assert np.rad2deg(near.joints) < 2.8
     assert near.root < 0.013
