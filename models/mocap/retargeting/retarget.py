@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry import quaternions
 from geometry.arrays import Array, Mask
+from geometry.physics import GRAVITY
 from models.humanoid.skeleton import SEGMENTS, figure_model
 from models.mocap.motion.clip import Clip
 from models.mocap.readers.motion_file import MotionFileError
@@ -127,7 +128,7 @@ def retarget(motion: SourceMotion, roles: Roles, hints: Hints = _NO_HINTS) -> tu
     counted = ~filled & _in_long_pieces([k - frames.dropped for k in repairs.jumps], len(filled))
     on_floor = put_on_floor(body.root, body.segments, motion.fps, counted)
     clip = Clip(_poses(*on_floor), motion.fps, motion.path.stem)
-    propped = unsupported_time(lines, positions, up.axis, motion.fps)
+    propped = unsupported_time(lines, positions, up.axis, motion.fps, GRAVITY / scale)
     remarks = (
         *frame_remarks(repairs.frames, repairs.jumps, repairs.shortened, motion.fps, motion.timed),
         *leap_remarks(repairs.leaps, motion.fps),

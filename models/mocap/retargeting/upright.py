@@ -228,26 +228,38 @@ def _axis_score(name: str, lines: BodyLines, positions: Array, frames: IntArray)
     heights = positions[frames] @ up
     lowest = heights.min(axis=1)
     spread = float(np.subtract(*np.quantile(lowest, (0.95, 0.05)))) / lines.leg
-    balance = float(_distance_outside(lines, positions, frames, up).mean()) / lines.leg
+    balance = float(_outside(lines, positions, frames, up)[0].mean()) / lines.leg
     return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CONVENTION_BONUS * (name in ("+Y", "+Z"))
 
 
-def _distance_outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> Array:
-    """Distance of the middle of hips and shoulders outside the hull of the lowest joints, seen along an axis, (m,)."""
+def _outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> tuple[Array, Array]:
+    """Distance of the middle of hips and shoulders outside the hull of the lowest joints, seen along an axis, (m,).
+
+    The second array has the horizontal unit vectors from the hull to the middle, (m, 3); 0 inside.
+    """
     heights = positions[frames] @ up
     bearing = heights < heights.min(axis=1)[:, None] + _MAX_SUPPORT_HEIGHT * lines.leg
     first, second = np.roll(up, 1), np.roll(up, 2)
     middle = (lines.middle + lines.top)[frames] / 2.0
-    outside = np.zeros(len(frames))
+    outside, directions = np.zeros(len(frames)), np.zeros((len(frames), 3))
     for angle in np.arange(_DIRECTION_COUNT) * 2.0 * np.pi / _DIRECTION_COUNT:
         along = np.cos(angle) * first + np.sin(angle) * second
         furthest = np.where(bearing, positions[frames] @ along, -np.inf).max(axis=1)
-        outside = np.maximum(outside, middle @ along - furthest)
-    return outside
+        distance = middle @ along - furthest
+        directions[distance > outside] = along
+        outside = np.maximum(outside, distance)
+    return outside, directions
 
 
-def unsupported_time(lines: BodyLines, positions: Array, up: Array, fps: float) -> float:
-    """Time for which the body's weight is beside its lowest joints [s]: on a chair, against a wall, on a rope.
+def unsupported_time(lines: BodyLines, positions: Array, up: Array, fps: float, gravity: float) -> float:
+    r"""Time for which neither the feet nor other low parts hold the body [s]: on a chair, against a wall, on a rope.
+
+    Its weight is beside them for a second or more, and its acceleration a does not explain that. Forces on the lowest
+    joints, from which the body's middle is d away horizontally and h in height, act without a moment about it if
+
+    .. math:: (g + a_z)\, d = h\, a_h
+
+    (the zero moment point of a point mass). This is tested on average over each second: a run on a curve leans.
 
     Parameters
     ----------
@@ -259,6 +271,23 @@ def unsupported_time(lines: BodyLines, positions: Array, up: Array, fps: float) 
         Upward unit vector, one of the file's axes.
     fps : float
         Frame rate [1/s].
+    gravity : float
+        g in the file's unit of length [1/s²].
     """
-    beside = _distance_outside(lines, positions, np.arange(len(positions)), up) > _MIN_PROPPED_DISTANCE * lines.leg
-    return sum(end - start for start, end in spans(beside) if end - start > _MIN_PROPPED_TIME * fps) / fps
+    distances, directions = _outside(lines, positions, np.arange(len(positions)), up)
+    middle, lowest = (lines.middle + lines.top) / 2.0, (positions @ up).min(axis=1)
+    limit, least, total = _MIN_PROPPED_DISTANCE * lines.leg, _MIN_PROPPED_TIME * fps, 0
+    for start, end in spans(distances > limit):
+        count = max(1, int((end - start) / max(least, 3.0))) if end - start > least else 0
+        for piece in np.array_split(np.arange(start, end), count) if count else []:
+            offset = (distances[piece, None] * directions[piece]).mean(axis=0)
+            acceleration = _acceleration(middle[piece], fps)
+            rise, height = acceleration @ up, float((middle[piece] @ up - lowest[piece]).mean())
+            moment = (gravity + rise) * offset - height * (acceleration - rise * up)
+            total += len(piece) if float(np.linalg.norm(moment)) > gravity * limit else 0
+    return total / fps
+
+
+def _acceleration(places: Array, fps: float) -> Array:
+    """Constant acceleration that fits a path (n, 3) best; 0 of one or two places, which show none."""
+    return 2.0 * np.polyfit(np.arange(len(places)) / fps, places, 2)[0] if len(places) > 2 else np.zeros(3)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from geometry.physics import GRAVITY
 from models.errors import ModelError
 from models.mocap.library import load
 from models.mocap.motion.clip import Clip
 from models.mocap.retargeting.hints import Hints
 from tests.models.mocap.retargeting.posed_clips import posed, rotated_about_the_origin
-from tests.models.mocap.retargeting.rigs import Rig, write_rig
+from tests.models.mocap.retargeting.rigs import Rig, at_rate, write_rig
 
 
 def test_up_axis_is_not_determined_for_a_part_of_a_somersault(motions, tmp_path):
@@ -70,3 +71,40 @@ def test_up_axis_is_not_determined_for_a_fall_that_ends_lying(thigh, shank, fram
     with pytest.raises(ModelError, match=r"up axis cannot be inferred .*; expected .*--up \+Y"):
         load(tmp_path / "r.bvh")
     assert load(tmp_path / "r.bvh", Hints(up="+Y")).report.up == "+Y"
+
+
+@pytest.mark.parametrize("n_frames", [2, 3])
+def test_seat_is_remarked_in_a_file_of_a_few_frames_that_last_a_second(n_frames, motions, tmp_path):
+    bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
+            for part, degrees in (("thigh", -85.0), ("shank", 85.0))]  # fmt: skip
+    seat = posed(bend, motions.clip("cheer"))
+    write_rig(Rig(), Clip(seat.poses[:n_frames], 1.0, "seat"), tmp_path / "r.bvh")
+    remarks = load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks
+    assert any(f"for {n_frames}.0 s the body's weight is above neither" in remark for remark in remarks)
+
+
+def test_run_on_a_curve_is_not_said_to_lean_on_something(tmp_path):
+    """A body that leans by φ on a curve of the radius v² / (g tan φ) is in balance; on a straight path it is not."""
+    run, lean = at_rate("run", 60.0), np.deg2rad(25.0)
+    laps, lap = [], run.poses
+    for _ in range(4):
+        laps.append(lap[:-1])
+        lap = run.displacement.moved(lap)
+    upright = np.concatenate(laps)
+    speed = float(np.linalg.norm(run.displacement.moved(run.poses[:1])[0, :2] - run.poses[0, :2])) / run.duration
+    radius = speed**2 / (GRAVITY * np.tan(lean))
+    along = np.arange(len(upright)) / run.fps * speed
+    inwards = Rotation.from_euler("x", -np.rad2deg(lean), degrees=True)
+
+    def leaning(turns, centre):
+        turned = (turns * inwards * Rotation.from_quat(upright[:, 3:7], scalar_first=True)).as_quat(scalar_first=True)
+        places = centre + turns.apply(inwards.apply(upright[:, :3] - np.outer(along, np.eye(3)[0])))
+        return Clip(np.column_stack((places, turned, upright[:, 7:])), run.fps, "run")
+
+    around = Rotation.from_euler("z", along[:, None] / radius)
+    curve = around.apply([0.0, -radius, 0.0])
+    straight = np.outer(along, np.eye(3)[0])
+    for turns, centre, leans in ((around, curve, False), (Rotation.identity(len(along)), straight, True)):
+        write_rig(Rig(zero="upright T"), leaning(turns, centre), tmp_path / "r.bvh")
+        remarks = load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks
+        assert any("what it sits, hangs or leans on" in remark for remark in remarks) == leans
