@@ -30,7 +30,7 @@ from models.humanoid.skeleton import BODIES, SEGMENTS, figure_model
 from models.mocap.retargeting.body_lines import SIDES, BodyLines
 from models.mocap.retargeting.segment_frames import frames, with_constant_offset
 from models.mocap.retargeting.skeleton_roles import Roles, ancestry
-from models.mocap.retargeting.sole_calibration import calibrated_foot, foot_flat_frames
+from models.mocap.retargeting.sole_calibration import CalibratedFoot, calibrated_foot, foot_flat_frames
 
 _Z = np.array([0.0, 0.0, 1.0])
 # Standard deviation of the weight w over the angle between trunk and thighs: half the value turns the joints of 19
@@ -55,16 +55,13 @@ class Calibration(NamedTuple):
         R_S of the figure's segments; a segment without a source joint follows another one.
     bend : float
         Least angle between trunk and thighs [rad]: that of the straightest frame.
-    stances : tuple of int
-        Number of frames from which the left and the right sole were calibrated.
-    headings : tuple of bool
-        Whether the left and the right foot have the heading of their toes.
+    feet : tuple of CalibratedFoot
+        The left and the right foot.
     """
 
     segments: Array
     bend: float
-    stances: tuple[int, int]
-    headings: tuple[bool, bool]
+    feet: tuple[CalibratedFoot, CalibratedFoot]
 
 
 def calibrate(
@@ -101,22 +98,18 @@ def calibrate(
         _align_trunk(body.segments, unit(lines.trunk), _left_directions(lines)[1], has_clavicles)
         if "head" not in roles.segments:  # the head follows the chest, which has just been aligned
             body.set("head", body.segment("chest"))
-    feet: list[tuple[int, bool]] = []
+    feet: list[CalibratedFoot] = []
     for k in range(len(SIDES)):
         _set_limbs(body, lines, k, weights)
-        foot = body.source(f"{SIDES[k]}_foot")
+        foot, shank = body.source(f"{SIDES[k]}_foot"), body.segment(f"{SIDES[k]}_shank")
         if foot is None:
-            body.set(f"{SIDES[k]}_foot", body.segment(f"{SIDES[k]}_shank"))
-            feet.append((0, False))
-            continue
-        flat = foot_flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
-        shank = body.segment(f"{SIDES[k]}_shank")
-        toes, single = (lines.toes - lines.ankles)[:, k], rest_frame is None and lines.is_single_pose
-        sole, used, has_heading = calibrated_foot(foot, toes, shank, up, flat, straight, single)
-        body.set(f"{SIDES[k]}_foot", sole)
-        feet.append((used, has_heading))
-    (left, left_heading), (right, right_heading) = feet
-    return Calibration(body.segments, min_bend, (left, right), (left_heading, right_heading))
+            feet.append(CalibratedFoot(shank, 0, has_heading=False, toe_pitch=np.nan))
+        else:
+            flat = foot_flat_frames(lines, k, foot, up, fps) if rest_frame is None else np.array([rest_frame])
+            toes, single = (lines.toes - lines.ankles)[:, k], rest_frame is None and lines.is_single_pose
+            feet.append(calibrated_foot(foot, toes, shank, up, flat, straight, single))
+        body.set(f"{SIDES[k]}_foot", feet[k].rotations)
+    return Calibration(body.segments, min_bend, (feet[0], feet[1]))
 
 
 class _Body:

@@ -17,7 +17,7 @@ from models.mocap.retargeting.broken_frames import JointJump
 from models.mocap.retargeting.calibration import Calibration
 from models.mocap.retargeting.noise import Noise
 from models.mocap.retargeting.skeleton_roles import Roles
-from models.mocap.retargeting.sole_calibration import MIN_FLAT_FRAMES
+from models.mocap.retargeting.sole_calibration import MAX_TOE_PITCH, MIN_FLAT_FRAMES
 
 _MAX_SPINE_BEND = np.deg2rad(60.0)  # if the body never stands straighter than this, its spine cannot be calibrated well
 _MAX_NAMED = 12  # largest number of unused joints that are named: rigs with faces and fingers have hundreds
@@ -143,35 +143,51 @@ def beyond_range_remarks(poses: Array) -> Iterator[str]:
 
 
 def calibration_remarks(calibrated: Calibration, lines: BodyLines, roles: Roles, n: int) -> Iterator[str]:
-    """Soles calibrated from one pose or a few of n frames, a single shoulder, and a spine that is never straight."""
+    """Soles of one pose, a few of n frames, or above steep toes, a single shoulder, a spine that is never straight."""
     few = [
-        f"of the {side} one {count or 'none'}"
-        for side, count in zip(SIDES, calibrated.stances, strict=True)
-        if count < min(MIN_FLAT_FRAMES, n) and f"{side}_foot" in roles.segments
+        f"of the {side} one {foot.used or 'none'}"
+        for side, foot in zip(SIDES, calibrated.feet, strict=True)
+        if foot.used < min(MIN_FLAT_FRAMES, n) and f"{side}_foot" in roles.segments
     ]
     if few:
         remark = "the soles' orientation is estimated from few frames"
         yield f"{remark} ({', '.join(few)}); give --rest-frame"
     elif lines.is_single_pose and {"left_foot", "right_foot"} & roles.segments.keys():
         yield "the body holds one pose: the soles' orientation is estimated; give --rest-frame if they are level in it"
+    yield from _steep_toe_remarks(calibrated, roles)
     if {"head", "chest"} & roles.segments.keys() and sum(f"{side}_upper_arm" in roles.segments for side in SIDES) == 1:
         yield "there is one arm: the chest's orientation is estimated"
     if calibrated.bend > _MAX_SPINE_BEND:
         yield "the body never stands straight: its spine's rest pose is estimated; give --rest-frame"
 
 
+def _steep_toe_remarks(calibrated: Calibration, roles: Roles) -> Iterator[str]:
+    """Joints of toes that are further below a sole than those of feet that stand."""
+    steep = [
+        f"{np.rad2deg(foot.toe_pitch):.0f}° ({side} foot)"
+        for side, foot in zip(SIDES, calibrated.feet, strict=True)
+        if f"{side}_foot" in roles.ends and foot.used and foot.has_heading and foot.toe_pitch > MAX_TOE_PITCH
+    ]
+    if steep:
+        where = f"toes are {', '.join(steep)} below a sole that is taken to stand, as in high heels"
+        yield f"{where}: if the body hangs in the air, give --rest-frame"
+
+
 def endless_limb_remarks(lines: BodyLines, calibrated: Calibration, roles: Roles) -> Iterator[str]:
-    """Limbs whose end is defined neither by a joint nor by a tip, and feet whose tips are right below the ankle."""
+    """Limbs whose end is defined neither by a joint nor by a tip, and feet without a heading."""
     ends = {"upper_arm": lines.elbows, "forearm": lines.wrists, "shank": lines.ankles, "foot": lines.toes}
     named = [
         f"{side}_{part}"
         for part in ends
         for k, side in enumerate(SIDES)
-        if np.isnan(ends[part][:, k]).any() or (part == "foot" and not calibrated.headings[k])
+        if np.isnan(ends[part][:, k]).any() or (part == "foot" and not calibrated.feet[k].has_heading)
     ]
+    hanging = [limb.replace("_", " ") for limb in named if limb.endswith("foot") and limb in roles.ends]
     without = [limb.replace("_", " ") for limb in named if limb in roles.segments]
-    if without:
+    if without := [limb for limb in without if limb not in hanging]:
         yield f"the file does not define the ends of {', '.join(without)}: their directions are estimated"
+    if hanging:
+        yield f"the toes of {' and '.join(hanging)} are in line with the shank: where they point is estimated"
 
 
 def stretch_remarks(lines: BodyLines) -> Iterator[str]:

@@ -34,6 +34,21 @@ def test_hanging_foot_in_a_pose_that_is_held_is_not_levelled(n_frames, motions, 
         assert any("of the left one none" in remark for remark in loaded.report.remarks) == hangs
 
 
+@pytest.mark.parametrize(
+    ("down", "said"), [(0.0, ""), (20.0, "if the body hangs in the air"), (60.0, "are in line with the shank")]
+)
+def test_feet_that_hang_still_in_the_air_are_said_to_be_guessed(down, said, motions, tmp_path):
+    """As in loops of a fall: their toes are further below them than those of feet that stand, but for high heels."""
+    clip = motions.clip("cheer")
+    if down:
+        clip = posed([(f"{side}_foot", "y", down) for side in ("left", "right")], clip)
+    write_rig(Rig(), clip, tmp_path / "r.bvh")
+    remarks = "; ".join(load(tmp_path / "r.bvh", Hints(up="+Y")).report.remarks)
+    for text in ("if the body hangs in the air", "are in line with the shank"):
+        assert (text in remarks) == (text == said)
+    assert "does not define the ends" not in remarks
+
+
 def test_sole_orientation_of_a_squat_on_the_toes_is_remarked_as_a_guess(motions, tmp_path):
     """Its feet are at rest and low but not level: no ankle is bent by 50° on average."""
     squat = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")

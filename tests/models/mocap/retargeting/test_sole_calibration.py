@@ -17,7 +17,7 @@ def test_sole_in_a_lunge_is_levelled_unless_the_toes_show_a_raised_heel(
     source = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
     toes = np.tile([np.cos(np.deg2rad(toe_slope)), 0.0, -np.sin(np.deg2rad(toe_slope))], (n, 1))
     shank = np.tile(Rotation.from_euler("y", lean, degrees=True).as_quat(scalar_first=True), (n, 1))
-    calibrated, n_used, _ = calibrated_foot(source, toes, shank, UP, np.arange(n), np.ones(n))
+    calibrated, n_used, *_ = calibrated_foot(source, toes, shank, UP, np.arange(n), np.ones(n))
     normal = Rotation.from_quat(calibrated, scalar_first=True).apply(UP)[0]
     assert n_used == (n if level else 0)
     assert (normal @ UP > 0.9999) == level
