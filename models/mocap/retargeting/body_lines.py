@@ -76,6 +76,13 @@ class BodyLines(NamedTuple):
         return self.top - self.middle
 
     @property
+    def leg_difference(self) -> float:
+        """Length of the left leg less that of the right one, thigh and shank, median over time; NaN without ankles."""
+        parts = np.linalg.norm(self.knees - self.hips, axis=2), np.linalg.norm(self.ankles - self.knees, axis=2)
+        left, right = np.median(np.sum(parts, axis=0), axis=0)
+        return float(left - right)
+
+    @property
     def lowest_joints(self) -> Array:
         """Ankles, or knees where the skeleton ends there, shape (n, 2, 3)."""
         return np.where(np.isnan(self.ankles), self.knees, self.ankles)

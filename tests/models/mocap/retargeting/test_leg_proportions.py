@@ -1,5 +1,7 @@
 """Feet that stand in a file stay on the floor for any proportion of thighs to shanks."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from models.mocap.motion.kinematics import sole_points
 from models.mocap.retargeting import retarget
 from models.mocap.retargeting.hints import Hints
 from models.mocap.retargeting.leg_proportions import hips_over_feet
-from tests.models.mocap.retargeting.rigs import Rig, leg_scale, write_rig
+from tests.models.mocap.retargeting.rigs import Rig, at_rate, leg_scale, write_rig
 
 FPS = 60.0
 UP = Hints(up="+Y")
@@ -99,3 +101,21 @@ def test_root_is_unchanged_without_ankles_standing_feet_or_a_second_frame():
     assert hips_over_feet(root, segments, flying, flying, FPS) is root
     one_frame = root[:1]
     assert hips_over_feet(one_frame, segments[:1], flying[:1], flying[:1], FPS) is one_frame
+
+
+@pytest.mark.parametrize(("longer", "said"), [(1.04, False), (1.2, True)])
+def test_legs_of_different_lengths_are_remarked(longer, said, tmp_path):
+    """With the figure's legs, which are equal, one of two standing feet is in the air."""
+    write_rig(Rig(), at_rate("walk", 30.0), tmp_path / "r.bvh")
+
+    def lengthened(match):
+        return match[1] + " ".join(str(longer * float(x)) for x in match[2].split())
+
+    text, count = re.subn(r"(JOINT LeftFoot\s*\{\s*OFFSET )(\S+ \S+ \S+)", lengthened, (tmp_path / "r.bvh").read_text())
+    assert count == 1
+    (tmp_path / "r.bvh").write_text(text)
+    remarks = "; ".join(load(tmp_path / "r.bvh", UP).report.remarks)
+    thigh, shank = _leg_lengths()
+    difference = (longer - 1.0) * shank * (thigh + shank) / (thigh + shank * (1.0 + longer) / 2.0)
+    assert (f"the left leg is {100.0 * difference:.0f} cm longer" in remarks) == said
+    assert SITTING_REMARK not in remarks
