@@ -79,10 +79,10 @@ class EditingSummary:
         done = "; ".join(f"at {press.start:.1f} s {press.line()}" for press in self.presses)
         shown, changes = self.animation, list[str]()
         if shown is not None:
-            changed = max(shown.pushed_deg, shown.unpushed_deg)
-            changes = [
-                f"While it was edited the animation changed by up to {changed:.1f}° a joint{_residual(self.figure)}."
-            ]
+            by = shown.changed(False, 1)
+            changes = (
+                [f"While it was edited the animation changed by up to {by}{_residual(self.figure)}."] if by else []
+            )
         return [
             f"Editing, {self.seconds:.1f} s: {done or 'the switch was not pressed'}.",
             *pushes_line(self.pushes),
@@ -118,15 +118,14 @@ class PerformanceSummary:
 
     def lines(self) -> list[str]:
         """What happened, a sentence or two."""
-        alone, shown, changes = self.path.deviation_rms_mm, self.animation, list[str]()
-        left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the bent curve when left alone"
+        shown, changes = self.animation, list[str]()
         if shown is not None:
-            by = f"{shown.unpushed_deg:.1f}°"
-            if self.path.pushes:
-                by = f"{shown.pushed_deg:.1f}° a joint where it was pushed, {shown.unpushed_deg:.1f}° elsewhere"
-            changes = [f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."]
+            by = shown.changed(bool(self.path.pushes), 1)
+            differs = f"The performed animation differs from the unedited one by up to {by}{_residual(self.figure)}."
+            changes = [differs] if by else []
         return [
-            f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, {left}.",
+            f"Performing, {self.seconds:.1f} s from {self.start:.1f} s on: {self.path.laps:.2f} laps, "
+            f"{self.path.left_alone('the bent curve')}.",
             *pushes_line(self.path.pushes),
             *changes,
         ]

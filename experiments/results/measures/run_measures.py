@@ -245,7 +245,7 @@ class AnimationMeasure:
     def __init__(self, recording: Recording, since: float) -> None:
         self._since, self._soles = since, Soles(scene_of(recording))
         self._stride, self._next_row = max(1, round(recording.rates["frames"] / SOLES_RATE)), 0
-        self._pushed, self._unpushed, self._fastest = 0.0, 0.0, 0.0
+        self._pushed, self._unpushed, self._fastest = -math.inf, -math.inf, 0.0
         self._rate: float = recording.rates["frames"]
         self._last_pose: Array | None = None
 
@@ -261,15 +261,16 @@ class AnimationMeasure:
         turns = pose_difference(default, frames["reference"])[:, 6:].reshape(len(default), -1, 3)
         largest = np.max(np.linalg.norm(turns, axis=2), axis=1)
         settled = frames["t"] >= self._since + SETTLING_TIME
-        self._pushed = max(self._pushed, float(np.max(largest[settled & pushed], initial=0.0)))
-        self._unpushed = max(self._unpushed, float(np.max(largest[settled & ~pushed], initial=0.0)))
+        self._pushed = float(np.max(largest[pushed], initial=self._pushed))
+        self._unpushed = float(np.max(largest[settled & ~pushed], initial=self._unpushed))
 
     def summary(self) -> AnimationSummary:
         """The measures of all blocks added so far."""
         lowest = 100.0 * self._soles.lowest if math.isfinite(self._soles.lowest) else 0.0
-        return AnimationSummary(
-            math.degrees(self._pushed), math.degrees(self._unpushed), lowest, 100.0 * self._soles.slide, self._fastest
+        pushed, unpushed = (
+            math.degrees(turn) if math.isfinite(turn) else None for turn in (self._pushed, self._unpushed)
         )
+        return AnimationSummary(pushed, unpushed, lowest, 100.0 * self._soles.slide, self._fastest)
 
 
 def fault_lines(recording: Recording) -> tuple[str, ...]:

@@ -97,13 +97,11 @@ class RunSummary:
         if self.editing is not None:
             return [*replayed, *self.editing.lines(), *([] if self.performance is None else self.performance.lines())]
         path, animation = self.path, self.animation
-        alone = path.deviation_rms_mm
-        left = "never left alone" if alone is None else f"{alone:.2f} mm RMS from the curve when left alone"
+        ran = f"The stylus ran {path.laps:.2f} laps, {path.left_alone('the curve')}."
         pushes = "; ".join(push.line() for push in path.pushes)
         worked = self.trace.line() if self.trace else f"Pushes: {pushes}." if pushes else "The hand did not push."
         if animation is None:
-            return [f"The stylus ran {path.laps:.2f} laps, {left}.", worked]
-        by = f"{max(animation.pushed_deg, animation.unpushed_deg):.2f}° a joint"
-        if pushes:
-            by = f"{animation.pushed_deg:.1f}° a joint where it was pushed, {animation.unpushed_deg:.2f}° elsewhere"
-        return [f"The stylus ran {path.laps:.2f} laps, {left}.", worked, f"The animation changed by up to {by}."]
+            return [ran, worked]
+        by = animation.changed(bool(pushes), 2)
+        changes = [f"The animation changed by up to {by}."] if by else []
+        return [ran, worked, *changes]

@@ -90,6 +90,12 @@ class PathSummary:
         )
         return " ".join(part for part in (stopped, paced) if part) or None
 
+    def left_alone(self, curve: str) -> str:
+        """How far the stylus was from a curve, such as ``the curve``, when the hand left it alone."""
+        if self.deviation_rms_mm is None:
+            return f"never left alone on {curve} for more than a second"
+        return f"{self.deviation_rms_mm:.2f} mm RMS from {curve} when left alone"
+
     @property
     def deviation_rms(self) -> float | None:
         """`deviation_rms_mm` in metres."""
@@ -102,10 +108,12 @@ class AnimationSummary:
 
     Attributes
     ----------
-    pushed_deg, unpushed_deg : float
+    pushed_deg : float or None
         Largest difference of a joint's rotation between h(p) and h at the curve's nearest point, while the hand exerts
-        a force and for a second after, and otherwise; the first second is left out. If the curve is bent, the
-        comparison is with h at the same phase of the unedited curve.
+        a force and for a second after; None if it exerts none. If the curve is bent, the comparison is with h at the
+        same phase of the unedited curve.
+    unpushed_deg : float or None
+        The same at all other times after the first second; None if there are none.
     lowest_sole_cm : float
         Least height of a point of the soles above the floor.
     foot_skate_cm : float
@@ -114,11 +122,23 @@ class AnimationSummary:
         Largest angular velocity of a joint [rad/s].
     """
 
-    pushed_deg: float
-    unpushed_deg: float
+    pushed_deg: float | None
+    unpushed_deg: float | None
     lowest_sole_cm: float = 0.0
     foot_skate_cm: float = 0.0
     fastest_joint: float = 0.0
+
+    @property
+    def changed_deg(self) -> float | None:
+        """Largest difference at any time; None if there is none."""
+        return max((x for x in (self.pushed_deg, self.unpushed_deg) if x is not None), default=None)
+
+    def changed(self, pushes: bool, digits: int) -> str:
+        """By how much a joint's rotation changed, apart where the hand pushed if it did; empty if not measured."""
+        if pushes and self.pushed_deg is not None:
+            elsewhere = "" if self.unpushed_deg is None else f", {self.unpushed_deg:.{digits}f}° elsewhere"
+            return f"{self.pushed_deg:.1f}° a joint where it was pushed{elsewhere}"
+        return "" if self.changed_deg is None else f"{self.changed_deg:.{digits}f}° a joint"
 
     def soles(self) -> str:
         """Height and slide of the soles, and a joint that is faster than any of a human body, in a sentence."""

@@ -72,7 +72,7 @@ def test_summary_of_hand_never_left_alone(tmp_path: Path) -> None:
     summary = summary_of(tmp_path / "run.h5")
     never = replace(summary, path=replace(summary.path, deviation_rms_mm=None))
     assert "0.20 mm RMS from the curve when left alone" in summary.lines()[1]
-    assert "laps, never left alone." in never.lines()[1]
+    assert "laps, never left alone on the curve for more than a second." in never.lines()[1]
 
 
 def test_measures_of_synthetic_recording_match_its_construction(tmp_path: Path) -> None:
@@ -148,7 +148,12 @@ def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     assert paths[1].pushes[0].start == pytest.approx(2.0, abs=0.01)
     assert [path.deviation_rms_mm for path in paths] == [pytest.approx(0.2), None, pytest.approx(0.2)]
     assert paths[1].deviation_max_mm is None
-    assert [animation.unpushed_deg for _, animation, _, _ in parts] == [0.0, 0.0, 0.0]
+    animations = [animation for _, animation, _, _ in parts]
+    # A push counts in the first second of a span, too, and what is not measured is not 0.
+    assert animations[1].pushed_deg == pytest.approx(np.degrees(0.1))
+    assert [(animations[0].pushed_deg, a.unpushed_deg) for a in animations] == [(None, 0.0), (None, None), (None, 0.0)]
+    assert [a.changed(False, 2) for a in animations] == ["0.00° a joint", "5.73° a joint", "5.73° a joint"]
+    assert animations[1].changed(True, 2) == "5.7° a joint where it was pushed"
     flights = [figure.flight_seconds for _, _, figure, _ in parts]
     assert flights == pytest.approx([0.2, 0.0, 0.0])
 
