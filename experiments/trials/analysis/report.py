@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from experiments.files.html_page import NUMBERS, html_page, image, sentences, short
 from experiments.results.folder import RECORDING, world_of
-from experiments.trials.analysis.sentences import three_sentences
+from experiments.trials.analysis.sentences import three_sentences, unstable_conditions
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.design.plan import Trial
 from experiments.trials.design.study_config import StudyConfig
@@ -173,7 +173,7 @@ _CONTRASTS_FILE = "contrasts.csv"
 def write_report(
     study: StudyConfig, text: str, trials: Sequence[Trial], frame: Any, path: Path, provenance: str
 ) -> tuple[Statistics, tuple[str, ...]]:
-    """Analyse a table and write the page; returns the statistics and the three sentences.
+    """Analyse a table and write the page; returns the statistics and the sentences that the page begins with.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def write_report(
     factors = {name: tuple(levels) for name, levels in study.factors.items()}
     found = statistics(frame, factors, study.between, measures, study.seed)
     failures = frame.loc[frame["state"].eq("failed"), "reason"].value_counts()
-    said = three_sentences(study, found, frame, int(failures.sum()))
+    said = (*three_sentences(study, found, frame, int(failures.sum())), *unstable_conditions(study, frame))
     factor, *rest = factors
     plots = {
         MEASURES[measure].says: levels_figure(frame, factor, factors[factor], rest, measure)

@@ -1,4 +1,4 @@
-"""The main results of a study in three sentences, for a skimming reader."""
+"""The main results of a study in three sentences, for a skimming reader, and which conditions are not stable."""
 
 import math
 from collections.abc import Sequence
@@ -38,6 +38,24 @@ def three_sentences(study: StudyConfig, found: Statistics, frame: Any, failed: i
         for measure in (study.ease, study.cost)
     )
     return first, ease, cost
+
+
+def unstable_conditions(study: StudyConfig, frame: Any) -> tuple[str, ...]:
+    """A sentence on the conditions whose k_r is beyond the critical one; none if there are no such conditions."""
+    if "margin_used" not in frame:
+        return ()
+    used = frame.groupby(list(study.factors), sort=False)["margin_used"].max()
+    beyond = used[used > 1.0]
+    if beyond.empty:
+        return ()
+    named: list[str] = []
+    for levels, share in beyond.items():
+        pairs = zip(study.factors, levels if isinstance(levels, tuple) else (levels,), strict=True)
+        named.append(f"{share:.3g} times with {', '.join(f'{factor} {level}' for factor, level in pairs)}")
+    return (
+        f"Unstable with some hand: k_r is more than the critical one, {'; '.join(named)}. Measures of a loop that "
+        "oscillates are those of a shaking device.",
+    )
 
 
 def _answer(contrasts: Sequence[Contrast], measure: str, factor: str, reason: str) -> str:

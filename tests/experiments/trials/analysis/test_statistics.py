@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.trials.analysis.effect_sizes import cohen_dz, hedges_g
-from experiments.trials.analysis.sentences import three_sentences
+from experiments.trials.analysis.sentences import three_sentences, unstable_conditions
 from experiments.trials.analysis.statistics import Contrast, Statistics, statistics
 from experiments.trials.design.study_config import parse_study
 
@@ -130,6 +130,19 @@ def test_unknown_effects_are_reported_with_their_reason() -> None:
         first, _, last = three_sentences(study, found, table, 0)
         assert reason in last
         assert first.startswith("One simulated person met 2 conditions")
+
+
+def test_conditions_beyond_the_stability_boundary_are_named() -> None:
+    study = parse_study(
+        {"name": "s", "factors": {"guidance": {"none": {}, "river": {}}, "map": {"a": {}, "b": {}}}}, ""
+    )
+    table = frame(-1.0)
+    assert unstable_conditions(study, table) == ()
+    table["margin_used"] = np.where(table["guidance"].eq("river") & table["map"].eq("b"), 12.17, 0.04)
+    (sentence,) = unstable_conditions(study, table)
+    assert "than the critical one, 12.2 times with guidance river, map b. " in sentence
+    table["margin_used"] = 0.04
+    assert unstable_conditions(study, table) == ()
 
 
 def test_two_trials_are_compared_without_an_interval() -> None:
