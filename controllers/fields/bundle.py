@@ -7,6 +7,7 @@ from operator import add
 import numpy as np
 
 from controllers.checks import check_field_types
+from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.fields.algebra.law import Law, Program
 from controllers.fields.river import River
@@ -49,6 +50,11 @@ class RiverBundle(Law):
         if name not in self.names:
             raise ParameterError(f"no river {name!r} in the bundle; there are {', '.join(self.names)}")
         return self.rivers[self.names.index(name)]
+
+    @property
+    def curves(self) -> tuple[Trajectory, ...]:
+        """Curves of the rivers."""
+        return tuple(river.curve for river in self.rivers)
 
     def flow(self, t: float, p: Array) -> Array:
         """V(p) [m/s], shape (3,)."""

@@ -382,7 +382,7 @@ class HigherOrder(Law):
     @property
     def curves(self) -> tuple[Trajectory, ...]:
         """Curves of the rivers."""
-        return tuple(river.curve for river in self.bundle.rivers)
+        return self.bundle.curves
 
     def _compose(self) -> Program:
         blocks: list[Array] = []

@@ -241,16 +241,17 @@ class Simulation:
         return curves[0]
 
     def _course(self, around: Trajectory) -> Trajectory:
-        """The field's curve that lies along the map's, such as one timed by `paced`; else the map's."""
+        """The field's curve that lies along the map's, such as one timed by `paced`; else its first; else the map's."""
         places = np.asarray(around.positions)
         for curve in self.field.curves:
             if np.shape(curve.positions) == places.shape and np.allclose(curve.positions, places):
                 return curve
-        return around
+        return next(iter(self.field.curves), around)
 
     def _parts(self, maps: ClipMapParts, seconds: float) -> Parts:
         limiter, program = ForceLimiter(self.clock.servo_period), self.field.program()
-        power, spring = limiter.peak * fastest(maps.curve), (np.inf, WORKSPACE_WIDTH)
+        pace = max(map(fastest, self.field.curves or (maps.curve,)))
+        power, spring = limiter.peak * pace, (np.inf, WORKSPACE_WIDTH)
         tank = self.tank or tank_for(power, (spring,), maps.reach, limiter)
         handled = tuple((grab.at, grab.end) for grab in self.user.grabs)
         return Parts(

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_PHASE, TRACE_RIVER, TRACE_SIZE
 from controllers.fields.algebra.law import Law
+from controllers.fields.higher_order import HigherOrder
 from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.haptic_map.base import HapticMap
 from controllers.state import HandState, stylus_path
@@ -98,11 +99,13 @@ class Session:
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """Constant data that the recording keeps beside the channels."""
         phases, notes = np.linspace(self.curve.start, self.curve.end, COURSE_POINTS), self.parts.notes
+        choices = [law for law in self.parts.program.laws if isinstance(law, HigherOrder)]
         scene = self.world.config
         return {
             "curve": self.curve.point(phases),
             "curve_span": np.array([self.curve.start, self.curve.end]),
             "curve_closed": float(self.curve.periodic),
+            **({"river_laps": np.array([c.duration for c in choices[0].curves])} if len(choices) == 1 else {}),
             "tube_radius": notes.tube_radius,
             **({"tube_name": notes.tube_name} if notes.tube_name else {}),
             "distance_from": notes.distance_from,

@@ -24,7 +24,7 @@ from experiments.results.measures.summary_parts import (
     TankSummary,
     TraceSummary,
 )
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, IntArray, Mask
 from geometry.spans import spans
 from models.mocap.motion.clip import pose_difference
 from sim.recording.recording import Recording
@@ -56,7 +56,9 @@ def summarise(
     recording : Recording
         Recording with the channels of `sim.loop.channels.groups`, and the arrays ``curve_span`` (first and last phase),
         ``curve_closed``, ``clip_seconds`` (duration of a lap at the own pace of the legs' clips, NaN where a lap plays
-        no clip), ``clip_laps`` (the same of each clip that is played), ``scene``, ``body_weight`` and ``com_height``.
+        no clip), ``clip_laps`` (the same of each clip that is played), ``scene``, ``body_weight`` and ``com_height``;
+        where one river at a time has the hand, ``river_laps`` (duration of a lap of each river), and
+        ``river_clip_laps`` (that at the own pace of its clip) if rivers play clips of their own.
     default_poses : callable
         Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
         in order of time.
@@ -138,14 +140,20 @@ class PathMeasure:
     def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
         self._since, self._handled = since, tuple(handled)
         start, end = recording.arrays["curve_span"]
-        self._span, self._closed = float(end - start), bool(recording.arrays["curve_closed"])
+        self._closed = bool(recording.arrays["curve_closed"])
+        rivers = recording.arrays.get("river_laps", np.empty(0))
+        self._spans = np.append(rivers, end - start)  # of the rivers, and last of the curve, whose number is −1
         self._left_alone = MeanSquare()
         self._phase: float | None = None
         self._clip_seconds = float(recording.arrays["clip_seconds"])
         self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
-        self._phase_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0
+        self._own_clips = recording.arrays.get("river_clip_laps")
+        own = np.full(len(rivers), self._clip_seconds) if self._own_clips is None else self._own_clips
+        self._clips = np.append(own, self._clip_seconds)
+        self._laps, self._clip_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0, 0.0
+        self._river = -1
         self._pace_ticks, self._ticks = max(1, round(_PACE_TIME * recording.rates["ticks"])), 0
-        self._travelled: list[float] = []  # phase travelled, every `_PACE_TIME`
+        self._travelled: list[float] = []  # time travelled in the clips [s], every `_PACE_TIME`
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
         self._last_push_time = -math.inf
         self._replayed = "replayed" in recording.texts
@@ -163,7 +171,7 @@ class PathMeasure:
         along = np.isfinite(ticks["distance"])  # infinite for a law without a curve
         self._has_curve |= bool(along.any())
         self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING_TIME) & ~pushed & along])
-        self._add_phase(t, ticks["phase"])
+        self._add_phase(t, ticks["phase"], ticks["river"].astype(np.int64))
         self._add_position(t, ticks["p"])
         handled = np.any([(start - _ROUNDING <= t) & (t <= end + _ROUNDING) for start, end in self._handled], axis=0)
         self._add_pushes(ticks, size, at_work & ~handled)
@@ -179,17 +187,24 @@ class PathMeasure:
             k += int(np.argmax(far))
             self._anchor, self._last_move_time = p[k].copy(), float(t[k])
 
-    def _add_phase(self, t: Array, phase: Array) -> None:
+    def _add_phase(self, t: Array, phase: Array, river: IntArray) -> None:
+        """Count laps of the river that has the hand, or of the curve; a change of river is no step along either."""
+        rivers = len(self._spans) > 1
+        if not rivers:
+            river = np.full_like(river, -1)
         if self._phase is None:
-            self._phase, self._start_time = float(phase[0]), float(t[0])
-        steps = np.diff(phase, prepend=self._phase)
-        if self._closed:
-            steps -= self._span * np.round(steps / self._span)
-        travelled = self._phase_travelled + np.cumsum(steps)
+            self._phase, self._river, self._start_time = float(phase[0]), int(river[0]), float(t[0])
+        steps = np.diff(phase, prepend=self._phase) / self._spans[river]
+        if self._closed or rivers:
+            steps -= np.round(steps)
+        if rivers:
+            steps[(np.diff(river, prepend=self._river) != 0) | (river < 0)] = 0.0
+        travelled = self._clip_travelled + np.cumsum(steps * self._clips[river])
         self._travelled += travelled[-self._ticks % self._pace_ticks :: self._pace_ticks].tolist()
         self._ticks += len(steps)
-        self._phase_travelled = float(travelled[-1])
-        self._phase, self._last_time = float(phase[-1]), float(t[-1])
+        self._laps += float(np.sum(steps))
+        self._clip_travelled = float(travelled[-1])
+        self._phase, self._river, self._last_time = float(phase[-1]), int(river[-1]), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
         for first, last in spans(at_work):
@@ -212,13 +227,14 @@ class PathMeasure:
 
     def summary(self) -> PathSummary:
         """The measures of all blocks added so far."""
-        laps = self._phase_travelled / self._span
-        seconds, clip = self._last_time - self._start_time, self._clip_seconds
+        laps, seconds = self._laps, self._last_time - self._start_time
         lap_seconds = seconds / laps if laps >= 1.0 else None
         stopped = self._last_move_time if self._last_time - self._last_move_time >= SETTLING_TIME else None
         moving = (seconds if stopped is None else stopped - self._start_time) or math.inf
-        pace = None if math.isnan(clip) or not self._has_curve else laps * clip / moving
+        pace = None if math.isnan(self._clip_seconds) or not self._has_curve else self._clip_travelled / moving
         paces = () if pace is None else tuple((laps * self._clip_laps / moving).tolist())
+        if pace is not None and self._own_clips is not None:
+            paces = (pace,)
         alone, most = (
             (1e3 * self._left_alone.root, 1e3 * self._left_alone.largest) if self._left_alone.count else (None, None)
         )

@@ -54,7 +54,8 @@ def rivers_parts(config: RunConfig, mode: Rivers, maps: ClipMapParts) -> Parts:
     bundle = river_bundle(course, maps.reach, river_time(mode), damping, mode.river_tube)
     power = sum(river_power(damping, fastest(river.curve)) for river in bundle.rivers)
     springs = ((stiffness, mode.river_tube),) * len(bundle.rivers)
-    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=drawn(choice.bundle, maps))
+    static = {**drawn(choice.bundle, maps), **own_clips(choice, maps)}
+    notes = Notes("RIVERS", mode.river_tube, "tube", "its river", static=static)
     pushes = maps.river_pushes(mode, config.seconds) if config.user.does == "push" and not config.user.pushes else None
     field = FixedField(law, course, power, springs, notes, urged, pushes=pushes, other=beside(choice.given, maps.curve))
     parts = fixed_curve_parts(config, mode, maps, field)
@@ -136,6 +137,13 @@ def drawn(bundle: RiverBundle, maps: ClipMapParts) -> Static:
     share = np.linspace(0.0, 1.0, COURSE_POINTS)
     curves = [r.curve.point(r.curve.start + share * r.curve.duration) for r in bundle.rivers]
     return {"river_names": "\n".join(names), "river_curves": np.array(curves)}
+
+
+def own_clips(choice: RiverChoice, maps: ClipMapParts) -> Static:
+    """For the summary, the duration [s] of a lap of each river at the own pace of its clip, where each has its own."""
+    if maps.curve_clip_seconds is not None:
+        return {"river_clip_laps": np.array([curve.duration for curve in choice.given])}
+    return {"river_clip_laps": np.resize(maps.lap_durations, len(choice.given))} if maps.plays_rivers else {}
 
 
 def river_bundle(curve: Trajectory, reach: float, tau: float, drag: float, epsilon: float) -> RiverBundle:

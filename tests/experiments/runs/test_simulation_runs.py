@@ -41,6 +41,24 @@ def test_summary_counts_laps_of_the_paced_curve() -> None:
     assert run.summary.path.laps == pytest.approx(4.0 / 16.0, rel=0.05)
 
 
+def test_summary_counts_laps_of_a_curve_that_is_not_the_maps() -> None:
+    around, small = hvf.circle(lap=4.0), hvf.circle(radius=0.03, lap=1.0)
+    haptic_map = hvf.Cylindrical(hvf.clips("cheer"), around=around)
+    run = hvf.Simulation(
+        field=hvf.Follow(small, k_r=300, b_d=8), haptic_map=haptic_map, figure=hvf.Figure(kind="none")
+    ).run(3.0)
+    x, y, _ = run.ticks["p"].T
+    turns = np.ptp(np.unwrap(np.arctan2(y, x))) / (2.0 * np.pi)
+    assert turns > 2.0
+    assert run.summary.path.laps == pytest.approx(turns, rel=0.02)
+
+
+def test_rivers_of_a_bundle_are_its_curves() -> None:
+    curves = hvf.circle(lap=4.0), hvf.circle(radius=0.03, lap=1.0)
+    bundle = hvf.RiverBundle(tuple(map(hvf.River, curves)), ("outer", "inner"))
+    assert bundle.curves == bundle.program().curves == curves
+
+
 def test_sweep_gives_its_values(sim: hvf.Simulation) -> None:
     *_, last = hvf.sweep(sim, {"field.k_r": [100, 800]}, seconds=0.1, threads=2)
     assert isinstance(last, hvf.Swept)

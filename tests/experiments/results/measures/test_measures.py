@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -156,6 +157,23 @@ def test_time_span_of_a_run_is_measured_alone(tmp_path: Path) -> None:
     assert animations[1].changed(True, 2) == "5.7° a joint where it was pushed"
     flights = [figure.flight_seconds for _, _, figure, _ in parts]
     assert flights == pytest.approx([0.2, 0.0, 0.0])
+
+
+def test_laps_are_counted_along_the_river_that_has_the_hand() -> None:
+    """One lap of 3 s, then one of 2 s from its middle on, then in no river; each plays a clip of 3 s."""
+    arrays = {"curve_span": np.array([0.0, 3.0]), "curve_closed": 1.0, "clip_seconds": 3.0}
+    arrays |= {"river_laps": np.array([3.0, 2.0]), "river_clip_laps": np.array([3.0, 3.0])}
+    path = measures.PathMeasure(SimpleNamespace(arrays=arrays, texts={}, rates={"ticks": 1000.0}))
+    t = np.arange(6000) * 1e-3
+    river = np.where(t < 3.0, 0.0, np.where(t < 5.0, 1.0, -1.0))
+    phase = np.where(t < 3.0, t, np.where(t < 5.0, np.mod(t - 2.0, 2.0), np.mod(7.0 * t, 1.3)))
+    place = np.stack((t, t, t), axis=1)
+    for rows in np.split(np.arange(6000), [2000, 3000, 3001, 4567]):
+        path.add({"t": t[rows], "p": place[rows], "nearest": place[rows], "distance": np.zeros(len(rows)),
+                  "phase": phase[rows], "river": river[rows], "user": np.zeros((len(rows), 3))})  # fmt: skip
+    summary = path.summary()
+    assert summary.laps == pytest.approx(2.0, abs=2e-3)
+    assert summary.paces == (pytest.approx(6.0 / 6.0, abs=2e-3),)
 
 
 def test_handled_time_counts_neither_as_push_nor_as_left_alone(tmp_path: Path) -> None:
