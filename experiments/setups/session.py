@@ -57,6 +57,12 @@ class Session:
         return self.parts.course
 
     @property
+    def river_laps(self) -> Array:
+        """Duration of a lap of each river [s] of a field that gives the hand to one at a time; else empty."""
+        choices = [law for law in self.parts.program.laws if isinstance(law, HigherOrder)]
+        return np.array([curve.duration for curve in choices[0].curves] if len(choices) == 1 else [])
+
+    @property
     def field(self) -> Law:
         """Law of force of the mode."""
         return self.parts.field
@@ -99,13 +105,12 @@ class Session:
     def static(self) -> dict[str, npt.ArrayLike | str]:
         """Constant data that the recording keeps beside the channels."""
         phases, notes = np.linspace(self.curve.start, self.curve.end, COURSE_POINTS), self.parts.notes
-        choices = [law for law in self.parts.program.laws if isinstance(law, HigherOrder)]
         scene = self.world.config
         return {
             "curve": self.curve.point(phases),
             "curve_span": np.array([self.curve.start, self.curve.end]),
             "curve_closed": float(self.curve.periodic),
-            **({"river_laps": np.array([c.duration for c in choices[0].curves])} if len(choices) == 1 else {}),
+            "river_laps": self.river_laps,
             "tube_radius": notes.tube_radius,
             **({"tube_name": notes.tube_name} if notes.tube_name else {}),
             "distance_from": notes.distance_from,

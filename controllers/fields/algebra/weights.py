@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from controllers.checks import check_kind, checked, numbers_of
+from controllers.checks import check_field_types, check_kind, checked, numbers_of
 from controllers.errors import ParameterError
 from controllers.safety.limiter import magnitude
 from controllers.state import HAND_POSITION, HAND_SWITCH, HAND_VELOCITY
@@ -83,9 +83,21 @@ class Weight:
 
     Made by `constant`, `ball`, `speed` and `switch`. All but the switch are C² in the state of the hand; at the
     switch a field jumps.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not finite, or the row is not one that these make: compiled code reads it unchecked.
     """
 
     row: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        if not np.isfinite(self.row).all():
+            raise ParameterError(f"numbers of a weight must be finite, got {self.row}")
+        if len(self.row) != WEIGHT_SIZE or self.row[_KIND] not in range(4):
+            raise ParameterError(f"row is {self.row}; expected a weight made by constant, ball, speed or switch")
 
     @staticmethod
     def constant(s: float) -> "Weight":
@@ -126,7 +138,5 @@ class Weight:
 
 
 def _weight(kind: int, *numbers: float) -> Weight:
-    if not np.isfinite([float(number) for number in numbers]).all():
-        raise ParameterError(f"numbers of a weight must be finite, got {numbers}")
     padding: Sequence[float] = [0.0] * (WEIGHT_SIZE - _NUMBERS - len(numbers))
     return Weight((float(kind), 0.0, *map(float, numbers), *padding))

@@ -11,6 +11,7 @@ from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS, ROWS
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.figure_measure import FigureMeasure, MeanSquare
+from experiments.results.measures.laps import counted_rivers, lap_steps
 from experiments.results.measures.oscillation import oscillation_summary
 from experiments.results.measures.soles import Soles
 from experiments.results.measures.summary import RunSummary
@@ -57,8 +58,8 @@ def summarise(
         Recording with the channels of `sim.loop.channels.groups`, and the arrays ``curve_span`` (first and last phase),
         ``curve_closed``, ``clip_seconds`` (duration of a lap at the own pace of the legs' clips, NaN where a lap plays
         no clip), ``clip_laps`` (the same of each clip that is played), ``scene``, ``body_weight`` and ``com_height``;
-        where one river at a time has the hand, ``river_laps`` (duration of a lap of each river), and
-        ``river_clip_laps`` (that at the own pace of its clip) if rivers play clips of their own.
+        ``river_laps`` (duration of a lap of each river, if one at a time has the hand), and ``river_clip_laps`` (that
+        at the own pace of its clip) if rivers play clips of their own.
     default_poses : callable
         Poses of the map on the given, unedited curve, from nearest points (k, 3), phases (k,) and rivers (k,); called
         in order of time.
@@ -144,14 +145,13 @@ class PathMeasure:
         rivers = recording.arrays.get("river_laps", np.empty(0))
         self._spans = np.append(rivers, end - start)  # of the rivers, and last of the curve, whose number is −1
         self._left_alone = MeanSquare()
-        self._phase: float | None = None
+        self._last: tuple[float, int] | None = None  # phase and river
         self._clip_seconds = float(recording.arrays["clip_seconds"])
         self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
         self._own_clips = recording.arrays.get("river_clip_laps")
         own = np.full(len(rivers), self._clip_seconds) if self._own_clips is None else self._own_clips
         self._clips = np.append(own, self._clip_seconds)
         self._laps, self._clip_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0, 0.0
-        self._river = -1
         self._pace_ticks, self._ticks = max(1, round(_PACE_TIME * recording.rates["ticks"])), 0
         self._travelled: list[float] = []  # time travelled in the clips [s], every `_PACE_TIME`
         self._anchor, self._last_move_time = np.full(3, np.inf), 0.0
@@ -171,7 +171,7 @@ class PathMeasure:
         along = np.isfinite(ticks["distance"])  # infinite for a law without a curve
         self._has_curve |= bool(along.any())
         self._left_alone.add(ticks["distance"][(t >= self._since + SETTLING_TIME) & ~pushed & along])
-        self._add_phase(t, ticks["phase"], ticks["river"].astype(np.int64))
+        self._add_phase(t, ticks["phase"], counted_rivers(ticks["river"], self._spans))
         self._add_position(t, ticks["p"])
         handled = np.any([(start - _ROUNDING <= t) & (t <= end + _ROUNDING) for start, end in self._handled], axis=0)
         self._add_pushes(ticks, size, at_work & ~handled)
@@ -188,23 +188,15 @@ class PathMeasure:
             self._anchor, self._last_move_time = p[k].copy(), float(t[k])
 
     def _add_phase(self, t: Array, phase: Array, river: IntArray) -> None:
-        """Count laps of the river that has the hand, or of the curve; a change of river is no step along either."""
-        rivers = len(self._spans) > 1
-        if not rivers:
-            river = np.full_like(river, -1)
-        if self._phase is None:
-            self._phase, self._river, self._start_time = float(phase[0]), int(river[0]), float(t[0])
-        steps = np.diff(phase, prepend=self._phase) / self._spans[river]
-        if self._closed or rivers:
-            steps -= np.round(steps)
-        if rivers:
-            steps[(np.diff(river, prepend=self._river) != 0) | (river < 0)] = 0.0
+        if self._last is None:
+            self._last, self._start_time = (float(phase[0]), int(river[0])), float(t[0])
+        steps = lap_steps(np.append(self._last[0], phase), np.append(self._last[1], river), self._spans, self._closed)
         travelled = self._clip_travelled + np.cumsum(steps * self._clips[river])
         self._travelled += travelled[-self._ticks % self._pace_ticks :: self._pace_ticks].tolist()
         self._ticks += len(steps)
         self._laps += float(np.sum(steps))
         self._clip_travelled = float(travelled[-1])
-        self._phase, self._river, self._last_time = float(phase[-1]), int(river[-1]), float(t[-1])
+        self._last, self._last_time = (float(phase[-1]), int(river[-1])), float(t[-1])
 
     def _add_pushes(self, ticks: Mapping[str, Array], size: Array, at_work: Mask) -> None:
         for first, last in spans(at_work):

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from experiments.config.run_config import PERSON_INTENTS, RunConfig
+from experiments.results.measures.laps import counted_rivers, lap_steps
 from experiments.results.measures.run_measures import SETTLING_TIME
 from experiments.results.measures.smoothness import (
     SPEED_RATE,
@@ -181,14 +182,14 @@ def intends_to_leave(config: RunConfig, t: Array) -> Mask:
 def _hand_measures(ticks: Mapping[str, Array], intent: Mask, session: Session) -> dict[str, float]:
     period, curve = session.servo.plant.period, session.curve
     user, force, v = ticks["user"], ticks["force"], ticks["v"]
-    steps = np.diff(ticks["phase"])
-    if curve.periodic:
-        steps -= curve.duration * np.round(steps / curve.duration)
+    spans = np.append(session.river_laps, curve.duration)
+    river = counted_rivers(ticks["river"], spans)
+    phase_steps = lap_steps(ticks["phase"], river, spans, curve.periodic) * spans[river[1:]]
     elapsed = float(ticks["t"][-1] - ticks["t"][0])
     sparc, jerk = _smoothness_per_lap(v, 1.0 / period, curve.duration)
     return {
         "tracking_error": 1e3 * _rms(ticks["distance"][~intent]),
-        "completion": float(np.clip(np.sum(steps) / elapsed, 0.0, 1.0)) if elapsed > 0.0 else _NAN,
+        "completion": float(np.clip(np.sum(phase_steps) / elapsed, 0.0, 1.0)) if elapsed > 0.0 else _NAN,
         "effort": float(np.sum(user**2)) * period,
         "hand_work": 1e3 * float(np.sum(np.abs(np.sum(user * v, axis=1)))) * period,
         "energy_exchanged": 1e3 * float(np.sum(force * v)) * period,
