@@ -18,7 +18,7 @@ def take(name: str, seconds: float, pace: float, height: float, start: float = 0
     poses[:, 0], poses[:, 2], poses[:, 3::4] = phase % LAP, height, 1.0
     poses[:, 7], poses[:, 8] = np.cos(0.3 * phase), np.sin(0.3 * phase)
     none = np.zeros(len(t))
-    return TakeData(name, poses, phase, LAP, np.zeros((len(t), 3)), none, none)
+    return TakeData(name, poses, phase / LAP, True, np.zeros((len(t), 3)), none, none)
 
 
 def test_mix_uses_the_other_take_at_equal_phase_inside_the_region():

@@ -1,7 +1,7 @@
 """Comparison of takes, and mixing of one animation from several takes.
 
 Two performances of a curve are not synchronous, as each has its own pace. A moment of one take therefore corresponds to
-the moment of the other at which the stylus was at the same phase of the curve.
+the moment of the other at which the stylus was at the same share of a lap.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import numpy as np
 
 from controllers.errors import ParameterError
 from experiments.results.folder import RECORDING, has_animation
+from experiments.results.measures.laps import counted_rivers, lap_durations, lap_steps
 from geometry import quaternions
 from geometry.arrays import Array
 from geometry.easing import smooth_steps
@@ -32,10 +33,10 @@ class TakeData:
         Name of its folder.
     poses : Array
         The animation as the hand made it, qpos, shape (n, 75).
-    phase : Array
-        Phase along the curve, unwrapped over laps [s], shape (n,).
-    lap : float
-        Duration of a lap [s]; infinite for an open curve.
+    laps : Array
+        Laps along the curve, or along the rivers that had the hand, shape (n,); the whole part counts whole laps.
+    closed : bool
+        Whether the curve is closed.
     path : Array
         Positions of the stylus in H [m], shape (n, 3).
     force, distance : Array
@@ -44,8 +45,8 @@ class TakeData:
 
     name: str
     poses: Array = field(repr=False)
-    phase: Array = field(repr=False)
-    lap: float
+    laps: Array = field(repr=False)
+    closed: bool
     path: Array = field(repr=False)
     force: Array = field(repr=False)
     distance: Array = field(repr=False)
@@ -70,33 +71,34 @@ class TakeData:
             stride = max(1, round(recording.rates["frames"] / FPS))
             poses = recording.channel("frames", "reference")[::stride]
             every = stride * round(recording.rates["ticks"] / recording.rates["frames"])
-            ticks = {name: recording.channel("ticks", name)[::every] for name in ("phase", "p", "force", "distance")}
-            start, end = recording.arrays["curve_span"]
-            lap = float(end - start) if float(recording.arrays["curve_closed"]) else np.inf
-        phase = ticks["phase"] if np.isinf(lap) else np.unwrap(ticks["phase"], period=lap)
+            ticks = {
+                name: recording.channel("ticks", name)[::every] for name in ("phase", "river", "p", "force", "distance")
+            }
+            spans = lap_durations(recording)
+            closed = len(spans) > 1 or bool(recording.arrays["curve_closed"])
+        phase, river = ticks["phase"], counted_rivers(ticks["river"], spans)
+        laps = phase[0] / spans[river[0]] + np.append(0.0, np.cumsum(lap_steps(phase, river, spans, closed)))
         force = np.linalg.norm(ticks["force"], axis=1)
-        return TakeData(folder.name, poses, phase, lap, ticks["p"], force, ticks["distance"])
+        return TakeData(folder.name, poses, laps, closed, ticks["p"], force, ticks["distance"])
 
-    def frames_at(self, phases: Array) -> Array:
-        """Fractional frame numbers at which the take is at given phases [s]; on a closed curve, in the nearest lap.
+    def frames_at(self, laps: Array) -> Array:
+        """Fractional frame numbers at which the take is at given `laps`; on a closed curve, in the nearest lap.
 
         Raises
         ------
         ParameterError
-            If the take does not pass these phases.
+            If the take does not pass these places.
         """
-        phase = np.maximum.accumulate(self.phase)
-        wanted = phases
-        if np.isfinite(self.lap):
-            laps = np.round((np.mean([phase[0], phase[-1]]) - np.mean(phases)) / self.lap)
-            wanted = phases + self.lap * laps
-        tolerance = 0.05 * (self.lap if np.isfinite(self.lap) else phase[-1] - phase[0])
-        if wanted[0] < phase[0] - tolerance or wanted[-1] > phase[-1] + tolerance:
+        own, wanted = np.maximum.accumulate(self.laps), laps
+        if self.closed:
+            wanted = laps + np.round(np.mean([own[0], own[-1]]) - np.mean(laps))
+        tolerance = 0.05 * (1.0 if self.closed else own[-1] - own[0])
+        if wanted[0] < own[0] - tolerance or wanted[-1] > own[-1] + tolerance:
             raise ParameterError(
-                f"{self.name} goes from phase {phase[0]:.1f} to {phase[-1]:.1f} s of the curve, the region from "
-                f"{wanted[0]:.1f} to {wanted[-1]:.1f} s; expected a region that both takes go through"
+                f"{self.name} goes from {own[0]:.2f} to {own[-1]:.2f} laps, the region from {wanted[0]:.2f} to "
+                f"{wanted[-1]:.2f}; expected a region that both takes go through"
             )
-        return np.interp(wanted, phase, np.arange(len(phase), dtype=np.float64))
+        return np.interp(wanted, own, np.arange(len(own), dtype=np.float64))
 
 
 class Region(NamedTuple):
@@ -129,7 +131,7 @@ def mixed(take: TakeData, regions: Sequence[Region], ease: float = 0.3) -> Array
         if end - start < 2.0 * ease:
             raise ParameterError(f"the region lasts {end - start:.2f} s; expected {2.0 * ease:g} s or more")
         rows = np.flatnonzero((times >= start) & (times <= end))
-        other_poses = _interpolate_frames(other.poses, other.frames_at(np.maximum.accumulate(take.phase)[rows]))
+        other_poses = _interpolate_frames(other.poses, other.frames_at(np.maximum.accumulate(take.laps)[rows]))
         edge = np.minimum(times[rows] - start, end - times[rows]) / ease
         poses[rows] = between(poses[rows], other_poses, smooth_steps(edge))
     return poses

@@ -3,6 +3,13 @@
 import numpy as np
 
 from geometry.arrays import Array, IntArray
+from sim.recording.recording import Recording
+
+
+def lap_durations(recording: Recording) -> Array:
+    """Duration of a lap [s] of each river that a hand may be in, and last that of the curve, shape (k + 1,)."""
+    start, end = recording.arrays["curve_span"]
+    return np.append(recording.arrays.get("river_laps", np.empty(0)), end - start)
 
 
 def counted_rivers(river: Array, spans: Array) -> IntArray:
@@ -20,7 +27,7 @@ def lap_steps(phase: Array, river: IntArray, spans: Array, closed: bool) -> Arra
     river : IntArray, shape (n,)
         As from `counted_rivers`; −1 where none of several rivers has the hand, which then makes no laps.
     spans : Array, shape (k + 1,)
-        Duration of a lap [s] of each of k rivers and, last, of the curve.
+        As from `lap_durations`.
     closed : bool
         Whether the curve, if there are no rivers, is closed.
     """

@@ -11,7 +11,7 @@ from experiments.results.measures.arm_summary import arm_summary
 from experiments.results.measures.blocks import BLOCK_FRAMES, BLOCK_ROWS, ROWS
 from experiments.results.measures.changes import river_changes
 from experiments.results.measures.figure_measure import FigureMeasure, MeanSquare
-from experiments.results.measures.laps import counted_rivers, lap_steps
+from experiments.results.measures.laps import counted_rivers, lap_durations, lap_steps
 from experiments.results.measures.oscillation import oscillation_summary
 from experiments.results.measures.soles import Soles
 from experiments.results.measures.summary import RunSummary
@@ -140,16 +140,14 @@ class PathMeasure:
 
     def __init__(self, recording: Recording, since: float = 0.0, handled: Sequence[Span] = ()):
         self._since, self._handled = since, tuple(handled)
-        start, end = recording.arrays["curve_span"]
         self._closed = bool(recording.arrays["curve_closed"])
-        rivers = recording.arrays.get("river_laps", np.empty(0))
-        self._spans = np.append(rivers, end - start)  # of the rivers, and last of the curve, whose number is −1
+        self._spans = lap_durations(recording)
         self._left_alone = MeanSquare()
         self._last: tuple[float, int] | None = None  # phase and river
         self._clip_seconds = float(recording.arrays["clip_seconds"])
         self._clip_laps = recording.arrays.get("clip_laps", np.array([self._clip_seconds]))
         self._own_clips = recording.arrays.get("river_clip_laps")
-        own = np.full(len(rivers), self._clip_seconds) if self._own_clips is None else self._own_clips
+        own = np.full(len(self._spans) - 1, self._clip_seconds) if self._own_clips is None else self._own_clips
         self._clips = np.append(own, self._clip_seconds)
         self._laps, self._clip_travelled, self._start_time, self._last_time = 0.0, 0.0, 0.0, 0.0
         self._pace_ticks, self._ticks = max(1, round(_PACE_TIME * recording.rates["ticks"])), 0
