@@ -108,7 +108,7 @@ def _interruption_message(command: Any) -> str:
             f"hvf run --config {command.out}/config.json --out NEW runs it again"
         )
     recorder = command.which if isinstance(command, command_class("hardware")) else command
-    if isinstance(recorder, command_class("arm") | RunHardware) and (recorder.out / RECORDING).exists():
+    if isinstance(recorder, RunHardware) and (recorder.out / RECORDING).exists():
         return f"what was recorded until then is in {recorder.out}: hvf report {recorder.out} writes its page"
     if isinstance(command, command_class("trials") | command_class("tune")) and command.out.exists():
         return f"finished trials are kept in {command.out}; the same command resumes from there"

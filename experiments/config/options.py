@@ -8,7 +8,6 @@ import types
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields, make_dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import docstring_parser
@@ -310,8 +309,8 @@ def given_options(options: object) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not False and value not in (None, "", ())}
 
 
-def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingProxyType({})) -> RunConfig:
-    """The configuration that options ask for: given options change that of ``--config``, or else those of `otherwise`.
+def config_of_options(options: object) -> RunConfig:
+    """The configuration that options ask for: given options change that of ``--config``, if there is one.
 
     Raises
     ------
@@ -320,9 +319,7 @@ def config_of_options(options: object, otherwise: Mapping[str, Any] = MappingPro
     """
     given = given_options(options)
     file = given.pop("config", None)
-    return (
-        run_config(**(dict(otherwise) | given)) if file is None else with_options(load_config(cast(Path, file)), given)
-    )
+    return run_config(**given) if file is None else with_options(load_config(cast(Path, file)), given)
 
 
 def with_options(config: RunConfig, words: Mapping[str, object]) -> RunConfig:

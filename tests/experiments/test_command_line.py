@@ -52,7 +52,7 @@ def test_run_with_invalid_option_is_refused_with_its_value(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["arm", "--stiffness", "-1"], "--stiffness is -1"),
+        (["live", "--stiffness", "-1"], "--stiffness is -1"),
         (["certify", "--stiffness", "-1"], "--stiffness is -1"),
         (["certify", "--hand-push", "-1"], "--hand-push is -1; expected 0 N or more"),
         (["certify", "--map", "no/map.npz"], "no/map.npz: cannot be read"),
@@ -225,23 +225,15 @@ def test_missing_library_for_mujoco_gl_is_named_and_skipped(first: str) -> None:
     assert completed.stdout.split()[-1] in ("None", "disable")
 
 
-@pytest.mark.parametrize(
-    ("command", "implementation"),
-    [(["arm"], "runs.run.run"), (["hardware", "run", "--device", "emulated"], "hardware.run.run_hardware")],
-)
-def test_interrupted_arm_or_device_run_names_its_recording(
-    command: list[str],
-    implementation: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+def test_interrupted_device_run_names_its_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: object) -> None:
         (tmp_path / "run.h5").write_bytes(b"")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"experiments.{implementation}", interrupted)
-    assert main([*command, "--out", str(tmp_path)]) == 130
+    monkeypatch.setattr("experiments.hardware.run.run_hardware", interrupted)
+    assert main(["hardware", "run", "--device", "emulated", "--out", str(tmp_path)]) == 130
     assert f"hvf report {tmp_path} writes its page" in capsys.readouterr().err
 
 

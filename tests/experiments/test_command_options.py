@@ -93,7 +93,7 @@ def test_random_command_line_runs_or_is_refused_in_one_line(
 ) -> None:
     """Random options with random values; runs last 20 ms, without a figure and a page."""
     monkeypatch.chdir(tmp_path)
-    for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify", "arm"):
+    for name in ("convert", "prepare", "repair", "track", "lift", "trials", "tune", "live", "certify"):
         monkeypatch.setattr(command_class(name), "__call__", lambda self: 0)  # arguments are parsed, nothing is run
     rng = random.Random(seed)
     accepted = 0
@@ -104,7 +104,7 @@ def test_random_command_line_runs_or_is_refused_in_one_line(
                 ["--figure", "none", "--seconds", "0.02", *_random_options(rng, "run", rng.randint(1, 2))],
             )
         else:
-            name = rng.choice(["convert", "prepare", "track", "certify", "lift", "arm", "trials", "tune", "live"])
+            name = rng.choice(["convert", "prepare", "track", "certify", "lift", "trials", "tune", "live"])
             words = _random_options(rng, name, rng.randint(0, 4))
         if "--view" in words:
             continue

@@ -39,6 +39,6 @@ def test_results_of_slow_commands_are_printed_as_json(
     monkeypatch.setattr("experiments.preparation.command.followed", lambda clip, seconds: followed(clip, 1.0))
     capsys.readouterr()
     assert _json(["track", "walk", "--seconds", "0.5"], capsys)["walk"]["root_error"] < 0.1
-    assert _json(["arm", "--seconds", "1.5", "--user", "relaxed", "--out", str(tmp_path / "arm")], capsys)["lines"]
+    assert _json(["run", "--map", "robot-arm", "--seconds", "1.5", "--out", str(tmp_path / "arm")], capsys)["lines"]
     assert _json(["prepare", str(WALK), str(tmp_path / "p.bvh")], capsys)["well_formed"]
     assert _json(["certify", "--clip", "walk", "--out", str(tmp_path / "c")], capsys)["ballistic"]["verdict"]

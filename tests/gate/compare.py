@@ -40,7 +40,7 @@ CASES = {
     "lift": f"lift walk run jump --out {_MAP}",
     "lifted": f"run --map {_MAP} --curve run --seconds 2",
     "lifted-rivers": f"run --map {_MAP} --curve walk --mode rivers --user push --seconds 4",
-    "arm": "arm --seconds 3",
+    "arm": "run --map robot-arm --user push --seconds 3",
     "kinematic": "run --figure kinematic --user push --seconds 2",
     "no-figure": "run --figure none --user push --seconds 2",
     "person": "run --person median --user push --seconds 3",
@@ -70,7 +70,7 @@ def command(case: str, folder: Path) -> list[str]:
         "experiments.cli",
         first,
         *others,
-        *(["--out", out] if first in ("run", "arm") else []),
+        *(["--out", out] if first == "run" else []),
     ]
 
 

@@ -28,7 +28,7 @@ from sim.recording.recording import Recording
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("arm") / "run"
-    assert main(["arm", "--seconds", "8", "--out", str(folder)]) == 0
+    assert main(["run", "--map", "robot-arm", "--user", "push", "--seconds", "8", "--out", str(folder)]) == 0
     return folder
 
 
@@ -100,7 +100,7 @@ def test_weak_motor_saturates_and_is_reported() -> None:
 
 def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for flags in (["--seconds", "0"], ["--figure-ticks", "0"], ["--radius", "0.5"], ["--lap", "nan"]):
-        assert main(["arm", *flags, "--out", str(tmp_path / "run")]) == 2
+        assert main(["run", "--map", "robot-arm", *flags, "--out", str(tmp_path / "run")]) == 2
         assert "Traceback" not in capsys.readouterr().err
         assert not (tmp_path / "run").exists()
 
@@ -129,8 +129,6 @@ def test_options_inapplicable_to_an_arm_are_refused(
     assert main(["run", "--map", "robot-arm", *words.split(), "--out", str(out)]) == 2
     assert message in capsys.readouterr().err
     assert not out.exists()
-    assert main(["arm", "--map", "cylindrical", "--out", str(out)]) == 2
-    assert "the map cylindrical moves a figure; expected --map robot-arm" in capsys.readouterr().err
     assert main(["live", "--map", "robot-arm", "--out", str(out)]) == 2
     assert "the live page shows a figure" in capsys.readouterr().err
     assert main(["hardware", "run", "--device", "emulated", "--arm", "--map", "robot-arm", "--out", str(out)]) == 2
