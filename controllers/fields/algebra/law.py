@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -334,5 +334,7 @@ class Program(Law):
                 stack.append(item.description())
                 continue
             taken, stack = stack[len(stack) - item.takes :], stack[: len(stack) - item.takes]
+            if item is Join.ADD and isinstance(summands := taken[0].get("add"), list):
+                taken[:1] = cast(list[dict[str, object]], summands)  # one list, however many laws are summed
             stack.append({item.name.lower(): taken, "parameters": numbers.tolist()})
         return stack[0]

@@ -99,6 +99,11 @@ def test_deep_sum_nested_to_the_right_is_evaluated():
     np.testing.assert_array_equal(force_of(field, HAND), expected)
 
 
+def test_description_of_a_sum_is_no_deeper_for_more_laws():
+    described = sum([A] * 1000).limited(5.0).description()
+    assert described == {"limit": [{"add": [A.description()] * 1000, "parameters": []}], "parameters": [5.0, np.inf]}
+
+
 def test_fractions_are_accepted_as_numbers():
     assert Weight.constant(Fraction(1, 4)) == Weight.constant(0.25)
     np.testing.assert_array_equal((Fraction(1, 2) * A).limited(Fraction(1, 4)).params[-2:], [0.25, np.inf])
