@@ -90,7 +90,8 @@ def _encoder(file: Path, width: int, height: int, fps: float) -> Generator[None,
     if file.suffix == ".gif":
         return write(
             str(file), (width, height), fps=fps, codec="gif", pix_fmt_out="pal8", quality=None, bitrate=None,
-            macro_block_size=1, output_params=["-filter_complex", _PALETTE, "-loop", "0"],
+            macro_block_size=1, ffmpeg_log_level="error",  # it warns of two equal colours in the palette
+            output_params=["-filter_complex", _PALETTE, "-loop", "0"],
         )  # fmt: skip
     return write(
         str(file), (width, height), fps=fps, codec="libx264", quality=None, macro_block_size=1, output_params=_OPTIONS
