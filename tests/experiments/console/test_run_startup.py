@@ -71,7 +71,9 @@ def lifted_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_robot_arm_run_compiles_nothing_in_its_own_process(tmp_path: Path) -> None:
-    completed = run_python(LISTENER + COMMAND, "arm", "--seconds", "1.5", "--out", str(tmp_path / "arm"))
+    completed = run_python(
+        LISTENER + COMMAND, "run", "--map", "robot-arm", "--seconds", "1.5", "--out", str(tmp_path / "arm")
+    )
     assert "The stylus ran" in completed.stdout
     assert compiled_names(completed) == []
 

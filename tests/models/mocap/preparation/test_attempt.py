@@ -11,6 +11,7 @@ from models.mocap.library import embedded
 from models.mocap.motion.clip import Clip
 from models.mocap.preparation import attempt as passes
 from models.mocap.preparation.attempt import Attempt, attempt, unchanged
+from models.mocap.preparation.bounds import MAX_SKATE
 from models.mocap.preparation.feasible import Feasible
 from models.mocap.preparation.looping import LoopedClip
 from models.mocap.preparation.poses import add_tangents
@@ -108,19 +109,19 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[WellFormed]:
 
 
 @pytest.mark.slow
-def test_jumps_whose_landings_need_too_large_torques_are_well_formed_after_a_second_pass(
+def test_jumps_whose_feet_slide_under_load_are_well_formed_after_a_second_pass(
     mocap: Path, measured: list[WellFormed]
 ) -> None:
-    """After one pass an ankle needs 109 % of its torque limit, and the physical figure falls at 4.5 s."""
+    """After one pass a foot skates by 38 mm, and the physical figure has a residual of 9 % instead of 3."""
     made = prepared(mocap / "cmu_amc/16_09.amc")
-    assert measured[0].strain > 1.05
-    assert measured[-1].strain <= 1.0
+    assert measured[0].skate > 0.03
+    assert measured[-1].skate <= MAX_SKATE
     assert not well_formed(made.clip, ()).faults()
 
 
 @pytest.mark.slow
 def test_spin_whose_foot_slides_under_load_slides_less_with_every_pass(mocap: Path, measured: list[WellFormed]) -> None:
-    """After one pass a foot skates by 131 mm under load, and the physical figure falls at 12.8 s."""
+    """After one pass a foot skates by 127 mm under load, and the physical figure falls at 2.1 s."""
     prepared(mocap / "deepmimic/humanoid3d_spin.txt")
     first, *_, last = measured
     assert first.skate > 10.0 * last.skate
