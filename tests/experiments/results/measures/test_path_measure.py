@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.results.measures.run_measures import PathMeasure
+from geometry.arrays import Array
 
 
 class PathRecording:
@@ -15,21 +16,20 @@ class PathRecording:
         self.rates = {"ticks": 1000.0}
 
 
+def ticks_on_curve(t: Array, phase: Array, p: Array) -> dict[str, Array]:
+    """Ticks of a hand on its curve that nobody pushes, in a run without rivers."""
+    return {
+        "t": t, "phase": phase, "p": p, "nearest": p, "distance": 0.0 * t, "user": 0.0 * p, "river": -np.ones(len(t)),
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("block", [100, 5000])
 def test_stylus_at_end_of_open_curve_is_reported_as_stopped(block: int) -> None:
     t = np.arange(5000) * 1e-3
     phase = np.minimum(2.0 * t, 4.0)  # twice its own pace, and at its end at 2 s
     jitter = 2e-4 * np.sin(300.0 * t)
     p = np.stack([0.01 * phase + jitter, 0.0 * t, 0.0 * t], axis=1)
-    rows = {
-        "t": t,
-        "phase": phase,
-        "p": p,
-        "nearest": p,
-        "distance": 0.0 * t,
-        "user": 0.0 * p,
-        "river": -np.ones(len(t)),
-    }
+    rows = ticks_on_curve(t, phase, p)
     measure = PathMeasure(PathRecording(4.0))  # pyright: ignore[reportArgumentType]
     for first in range(0, len(t), block):
         measure.add({name: values[first : first + block] for name, values in rows.items()})
@@ -57,15 +57,7 @@ def test_uneven_pace_of_the_hand_is_said(share: float, said: bool, block: int) -
     t = np.arange(9000) * 1e-3
     phase = t + share / (2.0 * np.pi) * np.sin(2.0 * np.pi * t)  # a pace of 1 + share cos 2πt
     p = np.stack([0.01 * phase, 0.0 * t, 0.0 * t], axis=1)
-    rows = {
-        "t": t,
-        "phase": phase,
-        "p": p,
-        "nearest": p,
-        "distance": 0.0 * t,
-        "user": 0.0 * p,
-        "river": -np.ones(len(t)),
-    }
+    rows = ticks_on_curve(t, phase, p)
     measure = PathMeasure(PathRecording(4.0))  # pyright: ignore[reportArgumentType]
     for first in range(0, len(t), block):
         measure.add({name: values[first : first + block] for name, values in rows.items()})
