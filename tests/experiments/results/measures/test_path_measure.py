@@ -1,10 +1,14 @@
 """The measure of the stylus' path."""
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from experiments.results.measures.run_measures import PathMeasure
-from geometry.arrays import Array
+
+Numbers = npt.NDArray[Any]
 
 
 class PathRecording:
@@ -16,7 +20,7 @@ class PathRecording:
         self.rates = {"ticks": 1000.0}
 
 
-def ticks_on_curve(t: Array, phase: Array, p: Array) -> dict[str, Array]:
+def ticks_on_curve(t: Numbers, phase: Numbers, p: Numbers) -> dict[str, Any]:
     """Ticks of a hand on its curve that nobody pushes, in a run without rivers."""
     return {
         "t": t, "phase": phase, "p": p, "nearest": p, "distance": 0.0 * t, "user": 0.0 * p, "river": -np.ones(len(t)),
