@@ -11,6 +11,10 @@ bears load until `lift_time` before it leaves. With the longer time alone the le
 0.05 s the residual of a run is 12.0 % of weight instead of 6, and jumping falls. With the shorter time alone a foot
 that leaves while the other stands is held too long: a dance has 4.1 % instead of 1.9, and a spin falls
 (docs/validation/preparation-choices.md).
+
+A point above the floor may bear load, too, if its foot stands on others and the reference has it in stance: it is about
+to touch down. Not if the reference holds it up, as on the ball of a foot that turns: the plan would load it, the foot
+roll over to it, and then stand flat while the reference turns (docs/validation/preparation-choices.md#pivoting).
 """
 
 import numpy as np
@@ -57,7 +61,8 @@ def find_support(s: FigureState, q_r: Array, v_r: Array, a_r: Array) -> float:
         now = s.twin_contact_pos[s.twin_contact[c]]
         touch = _nearness(s.points[c, 2], gains.contact_reach)
         if c < 2 * N_FOOT:
-            touch = max(touch, s.loaded[c // N_FOOT] * _nearness(s.points[c, 2], gains.settling_reach))
+            settling = s.loaded[c // N_FOOT] * _nearness(now[2] - s.radius, gains.stance_height)
+            touch = max(touch, settling * _nearness(s.points[c, 2], gains.settling_reach))
         stillness = _stillness(now, at_unload[c], gains.unload_time * gains.swing_speed)
         height = max(now[2], at_unload[c, 2]) - s.radius
         s.near[c] = stillness * _nearness(height, gains.stance_height)

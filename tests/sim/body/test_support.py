@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from models.humanoid.skeleton import CONTACT_RADIUS, figure_model
+from models.humanoid.skeleton import CONTACT_RADIUS, JOINTS, N_TANGENT, figure_model, rest_pose
 from models.mocap.library import embedded
 from models.mocap.motion.kinematics import sole_points
 from sim.body.clip_motion import ClipMotion, clip_motion
@@ -16,17 +16,32 @@ GAINS = FigureGains()
 
 def _supports(motion: ClipMotion, frames):
     """Shares of load and stance of the feet's spheres, (n, 8) each, for a figure exactly at its reference."""
+    found = [
+        _support(motion.poses[k], motion.velocities[k], motion.poses[k], motion.velocities[k], motion.accelerations[k])
+        for k in frames
+    ]
+    return np.array([shares for shares, _ in found]), np.array([stances for _, stances in found])
+
+
+def _support(pose, velocity, wanted_pose, wanted_velocity, wanted_acceleration):
+    """Shares of load and stance of the feet's spheres, (8,) each, for a figure in a pose, and its reference."""
     model = floor_world(TrackingConfig())
     data = mujoco.MjData(model)
     figure = Figure(model, data, figure_model(), PREFIX, GAINS)
-    shares, stances = [], []
-    for k in frames:
-        data.qpos[:], data.qvel[:] = motion.poses[k], motion.velocities[k]
-        mujoco.mj_forward(model, data)
-        figure.update(motion.poses[k], motion.velocities[k], motion.accelerations[k])
-        shares.append(figure.state.share[:8].copy())
-        stances.append(figure.state.near[:8].copy())
-    return np.array(shares), np.array(stances)
+    data.qpos[:], data.qvel[:] = pose, velocity
+    mujoco.mj_forward(model, data)
+    figure.update(wanted_pose, wanted_velocity, wanted_acceleration)
+    return figure.state.share[:8].copy(), figure.state.near[:8].copy()
+
+
+def _standing_on_inner_edges(roll: float):
+    """A pose that stands on the inner edges of feet rolled by an angle [rad]."""
+    pose = rest_pose().copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        at = 7 + 4 * JOINTS.index(f"{side}_ankle")
+        pose[at : at + 4] = np.cos(roll / 2), sign * np.sin(roll / 2), 0.0, 0.0
+    pose[2] -= (sole_points(pose[None])[0, :, 2] - CONTACT_RADIUS).min()
+    return pose
 
 
 def test_points_about_to_lift_are_released_and_resting_points_bear_load():
@@ -59,3 +74,17 @@ def test_last_points_before_a_flight_bear_load_until_takeoff():
     shares, stances = _supports(motion, before)
     assert stances.max() < 0.1
     assert shares.max() > 0.5
+
+
+def test_edge_that_the_reference_holds_up_bears_no_load_and_one_that_it_has_on_the_floor_does():
+    still = np.zeros(N_TANGENT)
+    rolled, flat = _standing_on_inner_edges(np.deg2rad(10.0)), _standing_on_inner_edges(0.0)
+    heights = sole_points(rolled[None])[0, :, 2] - CONTACT_RADIUS
+    raised = heights > GAINS.stance_height
+    assert raised.sum() == 4, heights
+    assert heights.max() < GAINS.settling_reach
+    held_up, _ = _support(rolled, still, rolled, still, still)
+    assert np.all(held_up[raised] == 0.0)
+    assert np.all(held_up[heights < 1e-4] > 0.9)
+    settling, _ = _support(rolled, still, flat, still, still)
+    assert np.all(settling[raised] > 0.05)
