@@ -16,22 +16,24 @@ GAINS = FigureGains()
 
 def _supports(motion: ClipMotion, frames):
     """Shares of load and stance of the feet's spheres, (n, 8) each, for a figure exactly at its reference."""
-    found = [
-        _support(motion.poses[k], motion.velocities[k], motion.poses[k], motion.velocities[k], motion.accelerations[k])
-        for k in frames
-    ]
+    support = _supporting()
+    found = [support(motion.poses[k], motion.poses[k], motion.velocities[k], motion.accelerations[k]) for k in frames]
     return np.array([shares for shares, _ in found]), np.array([stances for _, stances in found])
 
 
-def _support(pose, velocity, wanted_pose, wanted_velocity, wanted_acceleration):
-    """Shares of load and stance of the feet's spheres, (8,) each, for a figure in a pose, and its reference."""
+def _supporting():
+    """Shares of load and stance (8,) by pose of the figure, and pose, velocity and acceleration of its reference."""
     model = floor_world(TrackingConfig())
     data = mujoco.MjData(model)
     figure = Figure(model, data, figure_model(), PREFIX, GAINS)
-    data.qpos[:], data.qvel[:] = pose, velocity
-    mujoco.mj_forward(model, data)
-    figure.update(wanted_pose, wanted_velocity, wanted_acceleration)
-    return figure.state.share[:8].copy(), figure.state.near[:8].copy()
+
+    def support(pose, wanted_pose, wanted_velocity, wanted_acceleration):
+        data.qpos[:], data.qvel[:] = pose, wanted_velocity
+        mujoco.mj_forward(model, data)
+        figure.update(wanted_pose, wanted_velocity, wanted_acceleration)
+        return figure.state.share[:8].copy(), figure.state.near[:8].copy()
+
+    return support
 
 
 def _standing_on_inner_edges(roll: float):
@@ -77,14 +79,14 @@ def test_last_points_before_a_flight_bear_load_until_takeoff():
 
 
 def test_edge_that_the_reference_holds_up_bears_no_load_and_one_that_it_has_on_the_floor_does():
-    still = np.zeros(N_TANGENT)
+    support, still = _supporting(), np.zeros(N_TANGENT)
     rolled, flat = _standing_on_inner_edges(np.deg2rad(10.0)), _standing_on_inner_edges(0.0)
     heights = sole_points(rolled[None])[0, :, 2] - CONTACT_RADIUS
     raised = heights > GAINS.stance_height
     assert raised.sum() == 4, heights
     assert heights.max() < GAINS.settling_reach
-    held_up, _ = _support(rolled, still, rolled, still, still)
+    held_up, _ = support(rolled, rolled, still, still)
     assert np.all(held_up[raised] == 0.0)
     assert np.all(held_up[heights < 1e-4] > 0.9)
-    settling, _ = _support(rolled, still, flat, still, still)
+    settling, _ = support(rolled, flat, still, still)
     assert np.all(settling[raised] > 0.05)
