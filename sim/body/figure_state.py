@@ -48,8 +48,8 @@ class FigureGains(NamedTuple):
         walk, run and jump by at most 0.1 % of weight.
     stance_height : float
         Height of a contact point of the reference from which it is no longer in stance [m]. The residual of walk,
-        run and jump is 0.6, 1.7 and 2.8 % of weight; with half the value 0.6, 1.8 and 2.9, with twice 0.8, 2.2 and
-        6.3.
+        run and jump is 0.7, 1.6 and 2.9 % of weight; with half the value 0.7, 1.7 and 2.9, with twice 0.8, 2.2 and
+        6.5.
     swing_speed : float
         Horizontal speed of a low contact point of the reference from which it is in swing, not in stance [m/s]. Half
         or twice the value changes the residual of walk, run and jump by at most 0.1 % of weight.
