@@ -101,11 +101,15 @@ def natural_lap(loops: Sequence[Loop], apart: bool = False) -> float:
     is chosen. A lap of several short cycles gives the hand more time to change the blend. `apart` is as in
     `fit_to_lap`.
     """
-    first = loops[0]
-    stride = first.duration / (strides(first) if np.hypot(*first.drift[:2]) > 0.0 else 1)
-    fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
     longest = min(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)), _MAX_STEADY_LAP)
-    highest = int(longest / stride + _REPEAT_TOLERANCE)
-    laps = stride * np.arange(fewest, max(fewest, highest) + 1)
+    laps = whole_strides(loops[0], longest)
     worst = np.array([max(abs(np.log(one.duration / lap)) for one in fit_to_lap(loops, lap, apart)) for lap in laps])
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])
+
+
+def whole_strides(loop: Loop, longest: float) -> Array:
+    """Durations of whole numbers of strides of a loop from 3 s to `longest`, or of the fewest that last 3 s [s]."""
+    stride = loop.duration / (strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1)
+    fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
+    most = max(fewest, int(longest / stride + _REPEAT_TOLERANCE))
+    return np.arange(fewest, most + 1, dtype=np.float64) * stride

@@ -12,6 +12,7 @@ from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from controllers.haptic_map.lifting.arrangement_energy import PUSH_SPEED
 from controllers.haptic_map.river_clips import RiverClips
+from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER
 from controllers.state import stylus_path
 from experiments.config.run_config import Figure
 from experiments.fitting.animation_trial import FPS, AnimationTrial
@@ -138,8 +139,21 @@ def tour_of_rivers(haptic_map: RiverClips, part: Figure, figure: mujoco.MjModel)
     return Clip(poses[times >= 0.0], FPS, "rivers")
 
 
-def tour_remarks(haptic_map: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel) -> tuple[str, ...]:
-    """Remark on a map of three rivers, if the physical figure does not follow it; needs compiled code.
+def round_of_river(haptic_map: RiverClips, river: int) -> Clip:
+    """The animation of a hand that goes round one river at its pace, for a round and `_DWELL_TIME` [s]."""
+    curve = haptic_map.curves[river]
+    times, memory = _times(haptic_map.round_seconds(river) + _DWELL_TIME), haptic_map.compiled().memory
+    memory[ACTIVE_RIVER] = memory[TIMING_RIVER] = river
+    points = curve.point(curve.start + times % curve.duration)
+    return Clip(map_poses(haptic_map, stylus_path(points), memory), FPS, "alone")
+
+
+def river_remarks(
+    haptic_map: RiverClips, names: Sequence[str], part: Figure, figure: mujoco.MjModel
+) -> tuple[str, ...]:
+    """Remarks on what the physical figure does not follow on a map of three rivers; needs compiled code.
+
+    Each clip is tried alone through a whole round, since the changes between the rivers show parts of long clips only.
 
     Parameters
     ----------
@@ -152,15 +166,27 @@ def tour_remarks(haptic_map: RiverClips, names: Sequence[str], part: Figure, fig
     figure : mujoco.MjModel
         Model of the figure alone.
     """
+    rivers = {name: river for river, name in enumerate(names)}
+    lines = [line for name, river in rivers.items() for line in _remark_on_river(haptic_map, river, name)]
     made_of = (haptic_map.compiled().params, np.array([part.smoothing, part.blend]))
     trial = AnimationTrial(__name__, lambda: tour_of_rivers(haptic_map, part, figure), _RIVERS_DURATION, made_of)
     result = trial.followed()
     if result.stands:
-        return ()
+        return tuple(lines)
     where = ""
     if result.fell is not None:
         stop = min(int(result.fell // _DWELL_TIME), len(_ORDER) - 1)
         change = f"the change from {names[_ORDER[stop - 1]]} to {names[_ORDER[stop]]}"
         after = f", {result.fell - _DWELL_TIME * stop:.1f} s after {change}"
         where = after if stop else ", before any river changes"
-    return (f"from river to river the physical figure {result}{where}",)
+    return (*lines, f"from river to river the physical figure {result}{where}")
+
+
+def _remark_on_river(haptic_map: RiverClips, river: int, name: str) -> tuple[str, ...]:
+    """Remark on a river whose clip the physical figure does not follow alone, through a round at the river's pace."""
+    seconds, made_of = haptic_map.round_seconds(river), (haptic_map.compiled().params, np.array([river]))
+    trial = AnimationTrial(__name__, lambda: round_of_river(haptic_map, river), seconds + _DWELL_TIME, made_of)
+    result = trial.followed()
+    pace = haptic_map.loops[river].duration / seconds
+    remark = f"with {name} alone, at {pace:.2f} times its recorded speed, the physical figure {result}"
+    return () if result.stands else (remark,)

@@ -22,8 +22,9 @@ import tyro
 from controllers.haptic_map.lifting.room import Room
 from experiments.config.options import run_config
 from experiments.files.map_files import save_map
-from experiments.fitting.blendable import best_lap, closed_loops, not_blendable, off_pace, timing_clip
+from experiments.fitting.blendable import not_blendable
 from experiments.fitting.motion_faults import motion_faults
+from experiments.fitting.suitable_laps import best_lap, closed_loops, off_pace, timing_clip
 from experiments.lifting.lift import lift_clips
 from experiments.preparation.prepared_clip import prepared_clips
 from experiments.preparation.tracking_trial import followed
@@ -97,7 +98,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
     """
     began = time.process_time()
     loops = closed_loops(clips)
-    timing = 0 if kind == "composite" else timing_clip(clips)
+    timing = None if kind == "rivers" else 0 if kind == "composite" else timing_clip(clips)
     names = tuple(clip.name for clip in clips)
     mode = "rivers" if kind == "rivers" else "follow"
     with TemporaryDirectory() as scratch:
@@ -106,7 +107,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
             save_map(lift_clips([str(Path(folder) / name) for name in names], Room(), seed=seed).haptic_map, file)
             lap, words = clips[0].duration, dict[str, Any](map=str(file))
         else:
-            lap = best_lap(clips, timing, kind == "rivers")
+            lap = best_lap(clips, timing)
             words = dict[str, Any](map=kind, clips=names, lap=lap)
         config = run_config(mode=mode, user=user, seconds=RUN_SECONDS, seed=seed, **words)
         session = wire(config, tuple(clips))
@@ -125,7 +126,7 @@ def run_set(number: int, kind: str, clips: Sequence[Clip], seed: int, user: str,
         "legs": getattr(session.parts.maps.haptic_map, "legs_of", 0),
         "share": getattr(session.parts.maps.haptic_map, "share", None),
         "remarks": session.remarks, "fell": fell,
-        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing, kind == "rivers"),
+        "off_pace": () if kind == "lifted" else off_pace(clips, played, lap, laps, timing),
         "residual": rms(force), "peak": float(force.max()),
         "flight": float(np.mean(frames["flight"] > 0.0)),
         "held": float(np.mean(log.ticks["river"] >= 0.0)) if kind == "rivers" else None,

@@ -9,7 +9,8 @@ from controllers.errors import ParameterError
 from controllers.haptic_map.animation import AnimationMap
 from controllers.motion.strides import fit_to_lap
 from experiments.config.maps import Composite, Cylindrical, RiverClips
-from experiments.fitting.blendable import all_same, closed_loops, lap_suits_blend, not_blendable, off_pace, timing_clip
+from experiments.fitting.blendable import all_same, not_blendable
+from experiments.fitting.suitable_laps import closed_loops, lap_suits_blend, off_pace
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.lap import circle_of
@@ -54,18 +55,11 @@ def place_of(part: Cylindrical | Composite | RiverClips) -> Place:
     return Place(check_reach(circle_of(part)), part.around.radius, part.reach, part.expressive)
 
 
-def about_circle(
-    place: Place, haptic_map: AnimationMap, clips: tuple[Clip, ...], timing: int | None = None, in_rounds: bool = False
-) -> ClipMapParts:
-    """Map parts of a map of clips about a circle.
-
-    `timing` is the index of the clip whose pace a recommended lap keeps, by default the first without flights
-    (`timing_clip`); `in_rounds` says whether the clips may be played in rounds of several laps.
-    """
+def about_circle(place: Place, haptic_map: AnimationMap, clips: tuple[Clip, ...], timing: int | None) -> ClipMapParts:
+    """Map parts of a map of clips about a circle; `timing` is the clip whose pace an advised lap keeps (`best_lap`)."""
     curve, reach = place.curve, place.reach
-    timing = timing_clip(clips) if timing is None else timing
     played = _repeated(clips, len(haptic_map.loops))
-    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing, in_rounds)
+    off = off_pace(played, haptic_map.loops, curve.duration, haptic_map.laps, timing)
     return ClipMapParts(
         haptic_map=haptic_map, clips=clips, curve=curve, reach=reach,
         rivers=lambda mode: default_choice(mode, curve, reach),

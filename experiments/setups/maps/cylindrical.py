@@ -11,10 +11,11 @@ from controllers.haptic_map.cylindrical import LegsOfOneClip, correction_shape
 from controllers.legs.limbs import Limb
 from experiments.files.array_cache import cached_array
 from experiments.fitting.balance import with_balance
-from experiments.fitting.blendable import all_same, going_round, lap_suits_each, timing_clip
+from experiments.fitting.blendable import all_same, going_round
 from experiments.fitting.figure_legs import figure_legs
 from experiments.fitting.leg_choice import select_legs, single_clip_remarks
 from experiments.fitting.similarity import arms, moves_alike
+from experiments.fitting.suitable_laps import pace_mismatch, timing_clip
 from experiments.setups.maps.about_circle import Place, about_circle, motions_of, out_of_step, played_clips
 from experiments.setups.parts.part_types import ClipMapParts
 from geometry.arrays import Array
@@ -35,6 +36,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
     """
     played, reach = played_clips(clips, CORNERS, "cylindrical"), place.reach
     motions, radii, legs, lap = motions_of(played), place.radii(), figure_legs(figure), place.curve.duration
+    timing = timing_clip(clips)
 
     def with_legs_of(owner: int) -> CylindricalMap:
         own = LegsOfOneClip(owner, arms(legs), played[owner].name)
@@ -44,7 +46,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
         return select_legs(with_legs_of, [clip.name for clip in clips], lap, parallel)
 
     if out_of_step(played, lap):
-        parts = about_circle(place, with_legs_of(timing_clip(clips)), clips)
+        parts = about_circle(place, with_legs_of(timing), clips, timing)
         return replace(parts, refined=choose_legs).with_remarks(going_round(clips, legs))
     haptic_map = _cached_map(motions, radii, (-reach, reach), legs, lap)
 
@@ -52,11 +54,14 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
         if all_same(clips):
             balanced_map = with_balance(haptic_map, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and lap_suits_each(clips[:1], haptic_map.loops[:1], lap)
+            keeps_pace = pace_mismatch(clips[:1], haptic_map.loops[:1], lap) <= 1.0
+            as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keeps_pace
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
         return (with_balance(haptic_map, figure, lap), ()) if moves_alike(haptic_map, lap) else choose_legs()
 
-    return replace(about_circle(place, haptic_map, clips), refined=refined).with_remarks(going_round(clips, legs))
+    return replace(about_circle(place, haptic_map, clips, timing), refined=refined).with_remarks(
+        going_round(clips, legs)
+    )
 
 
 def _cached_map(

@@ -66,9 +66,9 @@ def _lap_of(part: Cylindrical | Composite | RiverClips | MapFile | RobotArm) -> 
     if not any(Path(name).suffix for name in part.clips):  # embedded clips have names without
         return DEFAULT_LAP
     # Imported late: they load splines, which a check of gains does not need.
-    from experiments.fitting.blendable import best_lap, timing_clip
+    from experiments.fitting.suitable_laps import best_lap, timing_clip
     from experiments.setups.parts.clips import load_clips
 
     clips, _ = load_clips(part.clips, part.raw)
-    timing = 0 if isinstance(part, Composite) else timing_clip(clips)
-    return best_lap(clips, timing, isinstance(part, RiverClips))
+    timing = None if isinstance(part, RiverClips) else 0 if isinstance(part, Composite) else timing_clip(clips)
+    return best_lap(clips, timing)

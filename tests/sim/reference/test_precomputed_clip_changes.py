@@ -14,6 +14,7 @@ from controllers.haptic_map.river_clips import RiverClips
 from controllers.haptic_map.river_memory import ACTIVE_RIVER, TIMING_RIVER, TRANSITION
 from controllers.state import stylus_path
 from experiments.config.options import run_config
+from experiments.config.run_config import Figure
 from experiments.files import array_cache
 from experiments.fitting import hand_tours, river_changes
 from experiments.fitting.animation_trial import AnimationTrial
@@ -169,10 +170,39 @@ def test_common_stride_count_of_two_clips_is_found(map_with_offsets: RiverClips)
 def test_remark_names_the_change_before_a_fall_or_the_missing_support(
     map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch, result: Followed, remarks: tuple[str, ...]
 ) -> None:
-    from experiments.config.run_config import Figure
+    def followed(trial: AnimationTrial) -> Followed:
+        return result if trial.seconds == hand_tours._RIVERS_DURATION else Followed(0.05)
 
-    monkeypatch.setattr(AnimationTrial, "followed", lambda _: result)
-    assert hand_tours.tour_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
+    monkeypatch.setattr(AnimationTrial, "followed", followed)
+    assert hand_tours.river_remarks(map_with_offsets, NAMES, Figure(), FIGURE) == remarks
+
+
+def test_each_clip_that_is_not_followed_through_its_round_is_named_once_with_its_pace(
+    map_with_offsets: RiverClips, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def followed(trial: AnimationTrial) -> Followed:
+        return Followed(0.05) if trial.seconds == hand_tours._RIVERS_DURATION else Followed(0.2, 3.0)
+
+    monkeypatch.setattr(AnimationTrial, "followed", followed)
+    paces = [f"{loop.duration / LAP:.2f}" for loop in map_with_offsets.loops]
+    assert hand_tours.river_remarks(map_with_offsets, ("dance", "walk", "walk"), Figure(), FIGURE) == (
+        f"with dance alone, at {paces[0]} times its recorded speed, the physical figure falls at 3.0 s",
+        f"with walk alone, at {paces[2]} times its recorded speed, the physical figure falls at 3.0 s",
+    )
+
+
+def test_trial_of_a_river_shows_its_clip_through_a_whole_round(map_with_offsets: RiverClips) -> None:
+    once = RiverClips(CURVES, [(clip.poses, clip.fps) for clip in load_clips(NAMES)[0]], 0.015, (), 3 * LAP, True, 3)
+    for river in (0, 2):
+        shown = hand_tours.round_of_river(once, river)
+        assert shown.duration > 3 * LAP + 5.0
+        again = round(3 * LAP * shown.fps)
+        np.testing.assert_allclose(np.abs(shown.poses[again, 7:]), np.abs(shown.poses[0, 7:]), atol=1e-6)
+        own = once.on_one_river().compiled().memory
+        own[ACTIVE_RIVER] = river
+        points = CURVES[0].point(CURVES[0].start + np.arange(shown.n_frames) / shown.fps % LAP)
+        alike = map_poses(once.on_one_river(), stylus_path(points), own)
+        np.testing.assert_allclose(shown.poses[:, 7:], alike[:, 7:], atol=2e-3)
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +255,6 @@ def test_animation_has_no_jump_and_the_figure_stands(run_folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("run_with_changes")
 def test_figure_follows_all_changes_between_three_clips_better_than_offsets() -> None:
-    from experiments.config.run_config import Figure
     from experiments.preparation.tracking_trial import followed
 
     haptic_map = map_parts(run_config("rivers", "rivers", clips=DISTINCT_CLIPS, lap=LAP), FIGURE).haptic_map
