@@ -18,7 +18,9 @@ beside their feet, need a lower score if both conventions confirm it. A body tha
 others needs no least score: it climbs over boxes or stairs. If the best axis is not the one along which the rig is
 drawn, it has to lead by more, and by far if the body turns towards that axis at times: a falling body is calm only
 while it lies. A body that sits, with trunk and shanks along the axis of its rig and thighs across, is upright although
-its weight is beside its feet.
+its weight is beside its feet; if the rig is drawn along neither +Y nor +Z and the score is not clear, along one of
+these whose floor is at zero. Any other axis has to be that of the zero pose, or have its floor at zero, as nothing else
+tells a body that stands along it from a swimmer's.
 """
 
 from dataclasses import replace
@@ -37,6 +39,7 @@ from models.mocap.retargeting.skeleton_roles import Roles
 AXES = {"+X": (1, 0, 0), "-X": (-1, 0, 0), "+Y": (0, 1, 0), "-Y": (0, -1, 0), "+Z": (0, 0, 1), "-Z": (0, 0, -1)}
 # Half or twice β, or any of the values below except the least scores, finds the same axes for 17 captures.
 _CONVENTION_BONUS = 0.1  # β
+_WRITTEN_AXES = ("+Y", "+Z")  # the only verticals that programs write
 # Least lead of the best axis over the next: the 28 captures of docs/validation/prepared-captures.md have 0.72 and more.
 _MIN_LEAD = 0.25
 # Least score of the best axis for bodies that rest on the ground, and for bodies that hardly do. In the same captures
@@ -68,6 +71,9 @@ _MAX_SUPPORT_HEIGHT = 0.12
 # Largest height of the lowest joint above a floor at zero for a lying body, and for a running one, whose lowest joint
 # may be an ankle [leg lengths]: 0.02 and 0.04 in two captures, and 0.01 to 0.19 in eight runs with low scores.
 _MAX_LYING_OFFSET, _MAX_RUNNING_OFFSET = 0.1, 0.2
+# Largest distance of the lowest joint from a floor at zero, for an axis that programs do not write and for a seat
+# [leg lengths]: at most 0.04 in three files, and 1.2 of a swimmer; of 782 files no other's axis depends on it.
+_MAX_FLOOR_OFFSET = 0.3
 _MIN_ALONG_COSINE = 0.8  # least cosine of the zero pose, and of the trunk of a run, to the vertical
 _MAX_LYING_HEIGHT = 0.5  # largest height of a lying body [leg lengths]: 0.2 and 0.3 in two captures
 _SAMPLE_COUNT = 200  # number of frames that are evaluated
@@ -109,13 +115,16 @@ def up_axis(motion: SourceMotion, roles: Roles, lines: BodyLines, positions: Arr
     rig = _describe_rig(_zero_pose_direction(motion, roles), lines, ~lost)
     if (lying := _lying_axis(best, rig.zero, positions[frames] / lines.leg)) is not None:
         lead, best, second = 0.0, lying, best
-    if rig.drawn is not None and _is_sitting(lines, frames, np.array(AXES[rig.drawn])):
-        clear, best, lead = True, rig.drawn, max(lead, _MIN_LEAD)
+    min_score = _min_score(best, lead, at_rest, rig, lines, positions, frames)
+    clear = lead >= _MIN_LEAD and scores[best] >= min_score
+    floors = {name: _has_floor_at_zero(name, lines, positions[frames]) for name in AXES}
+    if not (best in _WRITTEN_AXES or rig.zero @ AXES[best] > _MIN_ALONG_COSINE or floors[best]):
+        clear, second = False, max(_WRITTEN_AXES, key=lambda name: scores[name])
+    seat = next((name for name in _WRITTEN_AXES if _is_sitting(lines, frames, np.array(AXES[name]))), None)
+    if seat is not None and (seat == rig.drawn or (rig.drawn is None and floors[seat] and not clear)):
+        clear, best, lead = True, seat, max(lead, _MIN_LEAD)
     elif rig.contradicts(best, lead):
         clear, second = False, str(rig.drawn)
-    else:
-        min_score = _min_score(best, lead, at_rest, rig, lines, positions, frames)
-        clear = lead >= _MIN_LEAD and scores[best] >= min_score
     # Without ankles, the lowest joints are knees, which do not support a squat.
     if not clear or np.isnan(lines.ankles).any():
         raise MotionFileError(
@@ -152,7 +161,7 @@ class _Rig(NamedTuple):
 
 def _describe_rig(zero: Array, lines: BodyLines, kept: Mask) -> _Rig:
     """The rig's axis, and how the body is oriented to it in the frames `kept`."""
-    drawn = next((name for name in ("+Y", "+Z") if zero @ AXES[name] > _MIN_ALONG_COSINE), None)
+    drawn = next((name for name in _WRITTEN_AXES if zero @ AXES[name] > _MIN_ALONG_COSINE), None)
     if drawn is None or not kept.any():
         return _Rig(zero, drawn, -1.0, False)
     largest = [float((part[kept] @ AXES[drawn]).max()) for part in (_body_directions(lines), unit(lines.trunk))]
@@ -176,6 +185,12 @@ def _min_score(
     return _MIN_RESTING_SCORE if at_rest or confirmed else _MIN_MOVING_SCORE
 
 
+def _has_floor_at_zero(name: str, lines: BodyLines, positions: Array) -> bool:
+    """Whether the lowest joint is near zero along an axis, half of the time."""
+    lowest = (positions @ AXES[name]).min(axis=1) / lines.leg
+    return float(np.median(np.abs(lowest))) < _MAX_FLOOR_OFFSET
+
+
 def _is_sitting(lines: BodyLines, frames: IntArray, up: Array) -> bool:
     """Whether trunk and shanks are along an axis, and thighs across it."""
     thighs, shanks = lines.hips - lines.knees, lines.knees - lines.ankles
@@ -187,9 +202,9 @@ def _is_sitting(lines: BodyLines, frames: IntArray, up: Array) -> bool:
 
 def _lying_axis(best: str, zero: Array, positions: Array) -> str | None:
     """The vertical (+Y or +Z) if, contrary to the best axis, the body lies on a floor; positions in leg lengths."""
-    heights = {name: positions @ np.array(AXES[name], dtype=np.float64) for name in (best, "+Y", "+Z")}
+    heights = {name: positions @ np.array(AXES[name], dtype=np.float64) for name in (best, *_WRITTEN_AXES)}
     offsets = {name: float(np.quantile(np.abs(h.min(axis=1)), 0.9)) for name, h in heights.items()}
-    for name in ("+Y", "+Z"):
+    for name in _WRITTEN_AXES:
         is_low = float(np.median(np.ptp(heights[name], axis=1))) < _MAX_LYING_HEIGHT
         if offsets[name] < min(_MAX_LYING_OFFSET, offsets[best]) and is_low and zero @ AXES[name] > _MIN_ALONG_COSINE:
             return name
@@ -229,7 +244,7 @@ def _axis_score(name: str, lines: BodyLines, positions: Array, frames: IntArray)
     lowest = heights.min(axis=1)
     spread = float(np.subtract(*np.quantile(lowest, (0.95, 0.05)))) / lines.leg
     balance = float(_outside(lines, positions, frames, up)[0].mean()) / lines.leg
-    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CONVENTION_BONUS * (name in ("+Y", "+Z"))
+    return float((body @ up).mean()) - min(spread, 1.0) - 2.0 * balance + _CONVENTION_BONUS * (name in _WRITTEN_AXES)
 
 
 def _outside(lines: BodyLines, positions: Array, frames: IntArray, up: Array) -> tuple[Array, Array]:

@@ -41,17 +41,28 @@ def test_up_axis_of_a_leaning_run_is_found_only_if_the_rig_confirms_it(motions, 
         load(tmp_path / "r.bvh")
 
 
-def test_up_axis_is_found_for_a_body_sitting_on_a_chair(motions, tmp_path):
-    """Its weight is behind its feet; trunk and shanks are as in the rest pose of the rig, thighs horizontal."""
+@pytest.mark.parametrize(("zero", "lowered"), [("upright T", 0.0), ("along X", 0.4), ("along bones Y", 0.4)])
+def test_up_axis_is_found_for_a_body_sitting_on_a_chair(zero, lowered, motions, tmp_path):
+    """Its weight is behind its feet; thighs alone are across the axis of its rig, or that of a floor at zero."""
     bend = [(f"{side}_{part}", "y", degrees) for side in ("left", "right")
             for part, degrees in (("thigh", -85.0), ("shank", 85.0))]  # fmt: skip
     for up in ("+Y", "+Z"):
-        write_rig(Rig(up=up, zero="upright T"), posed(bend, motions.clip("cheer")), tmp_path / "r.bvh")
+        seated = rotated_about_the_origin(posed(bend, motions.clip("cheer")), "x", 0.0, (0.0, 0.0, -lowered))
+        write_rig(Rig(up=up, zero=zero), seated, tmp_path / "r.bvh")
         report = load(tmp_path / "r.bvh").report
         assert report.up == up
         assert any("what it sits, hangs or leans on" in remark for remark in report.remarks)
     write_rig(Rig(), motions.clip("squat_dance"), tmp_path / "r.bvh")
     assert not any("what it sits" in remark for remark in load(tmp_path / "r.bvh").report.remarks)
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [("y", -90.0), ("y", 90.0), ("x", 90.0)])
+def test_up_axis_is_not_determined_for_a_swimmer(axis, degrees, motions, tmp_path):
+    """Its body is as straight along an axis of the water as a standing one; neither its rig nor a floor is there."""
+    swimmer = rotated_about_the_origin(motions.clip("cheer"), axis, degrees, (1.0, 1.0, 1.5))
+    write_rig(Rig(up="+Z", zero="random"), swimmer, tmp_path / "r.bvh")
+    with pytest.raises(ModelError, match=re.escape("or --up +Z")):
+        load(tmp_path / "r.bvh")
 
 
 @pytest.mark.parametrize(("thigh", "shank", "frames"), [(0, 0, 24), (0, 0, 36), (-40, 60, 24), (-40, 60, 36)])
