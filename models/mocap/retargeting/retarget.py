@@ -28,7 +28,7 @@ from models.mocap.retargeting.calibration import Calibration, calibrate
 from models.mocap.retargeting.calibration_pose import calibration_pose_length
 from models.mocap.retargeting.footing import levelled, put_on_floor
 from models.mocap.retargeting.hints import Hints
-from models.mocap.retargeting.leg_proportions import hips_over_feet
+from models.mocap.retargeting.leg_proportions import hips_over_feet, rise_of_a_standing_foot
 from models.mocap.retargeting.noise import without_noise
 from models.mocap.retargeting.repeated_frames import without_repeated_frames
 from models.mocap.retargeting.restarted_paths import with_path_carried_on
@@ -64,12 +64,18 @@ _SITTING_REMARK = (
     "thighs and shanks are of another proportion than the figure's: between standing and sitting the hips are moved by "
     "{} cm in height, so that feet that stand stay on the floor"
 )
-# Largest difference of the legs' lengths, scaled to the figure, that is not reported [m]: a higher foot does not
-# stand (`models.mocap.dynamics.contacts`). It is at most 0.025 in 210 files, and 0.087 in the one it is from.
+# Largest difference of the legs' lengths, scaled to the figure, and height of one standing foot above the other, that
+# are not reported [m]: a higher foot does not stand (`models.mocap.dynamics.contacts`). The first is at most 0.025 in
+# 210 files, and 0.087 in the one it is from; the second at most 0.042 in 195 of 201 files, and 0.067 to 0.16 in four
+# whose hips are 2 to 4 times as wide as the figure's.
 _MAX_LEG_DIFFERENCE = 0.045
 _UNEQUAL_REMARK = (
     "the {} leg is {:.0f} cm longer than the other, scaled to the figure, whose legs are equal: one foot is above the "
     "floor where both stand in the file; check the file"
+)
+_RAISED_REMARK = (
+    "hips, thighs or shanks are of another proportion than the figure's: of two feet that stand flat in the file, one "
+    "is up to {:.0f} cm above the other"
 )
 
 
@@ -91,7 +97,7 @@ class _Body(NamedTuple):
 
     `path`, `legs` and `hip_to_ankle` are the middle of the hips, the vectors from hips to ankles, and from the middle
     of the hips to the ankles, scaled, before the hips are moved in height, at most by `hip_shift`, and the floor's
-    `slope` is levelled.
+    `slope` is levelled. Of two feet that stand in the file, one is above the other by `rise` at most.
     """
 
     root: Array
@@ -100,6 +106,7 @@ class _Body(NamedTuple):
     legs: Array
     hip_to_ankle: Array
     hip_shift: float
+    rise: float
     slope: float
 
 
@@ -173,11 +180,12 @@ def _scaled_body(lines: BodyLines, segments: Array, skipped: int, axes: Array, s
     hip_to_ankle = scale * quaternions.rotated(axes, ankles - hips[:, None])
     root = hips_over_feet(path, segments, legs, hip_to_ankle, fps)
     hip_shift = float(np.ptp(root[:, 2] - path[:, 2]))
+    rise = rise_of_a_standing_foot(path, segments, hip_to_ankle, fps)
     root, segments, slope = levelled(root, segments, fps)
     if slope:  # levelling changes the heading of a body that does not face along the slope
         facing = _world_axes(segments[0, 0], _Z)
         root, segments = quaternions.rotated(facing, root), quaternions.product(facing, segments)
-    return _Body(root, segments, path, legs, hip_to_ankle, hip_shift, slope)
+    return _Body(root, segments, path, legs, hip_to_ankle, hip_shift, rise, slope)
 
 
 def _step_remarks(body: _Body, figure_leg: float, fps: float) -> Iterator[str]:
@@ -196,6 +204,8 @@ def _support_remarks(body: _Body, leg_difference: float, propped: float) -> Iter
         yield _SLOPE_REMARK.format(np.rad2deg(body.slope))
     if abs(leg_difference) > _MAX_LEG_DIFFERENCE:
         yield _UNEQUAL_REMARK.format("left" if leg_difference > 0.0 else "right", 100.0 * abs(leg_difference))
+    elif body.rise > _MAX_LEG_DIFFERENCE:
+        yield _RAISED_REMARK.format(100.0 * body.rise)
     elif body.hip_shift:
         yield _SITTING_REMARK.format(round(100.0 * body.hip_shift))
     if propped:

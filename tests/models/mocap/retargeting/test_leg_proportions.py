@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from geometry.physics import GRAVITY
 from models.humanoid.skeleton import BODIES, CONTACT_RADIUS, figure_model, rest_pose
@@ -18,6 +19,7 @@ from tests.models.mocap.retargeting.rigs import Rig, at_rate, leg_scale, write_r
 FPS = 60.0
 UP = Hints(up="+Y")
 SITTING_REMARK = "between standing and sitting"
+RAISED_REMARK = "of two feet that stand flat in the file, one is up to"
 
 
 def _leg_lengths():
@@ -119,3 +121,26 @@ def test_legs_of_different_lengths_are_remarked(longer, said, tmp_path):
     difference = (longer - 1.0) * shank * (thigh + shank) / (thigh + shank * (1.0 + longer) / 2.0)
     assert (f"the left leg is {100.0 * difference:.0f} cm longer" in remarks) == said
     assert SITTING_REMARK not in remarks
+
+
+@pytest.mark.parametrize(("hips", "tilt", "said"), [(1.0, 20.0, False), (3.5, 3.0, False), (3.5, 20.0, True)])
+def test_foot_that_wide_hips_raise_is_remarked(hips, tilt, said, tmp_path):
+    """Hips tilt over a straight and a bent leg; both feet are flat and at one height in the rig."""
+    drop = 2.0 * hips * figure_model().body("left_thigh").pos[1] * np.sin(np.deg2rad(tilt))
+    bend = np.rad2deg(np.arccos(1.0 - drop / sum(_leg_lengths())))
+    level = Rotation.from_euler("x", -tilt, degrees=True)
+    turns = {
+        "pelvis": level.inv(),
+        "abdomen": level,
+        "left_thigh": level,
+        "right_thigh": level * Rotation.from_euler("y", -bend, degrees=True),
+        "right_shank": Rotation.from_euler("y", 2.0 * bend, degrees=True),
+        "right_foot": Rotation.from_euler("y", -bend, degrees=True),
+    }
+    poses = np.tile(rest_pose(), (30, 1))
+    local = poses[:, 3:].reshape(30, -1, 4)
+    for body, turn in turns.items():
+        local[:, BODIES.index(body)] = turn.as_quat(scalar_first=True)
+    poses[:, 3:] = local.reshape(30, -1)
+    write_rig(Rig(proportions={"hips": hips}), Clip(poses, 30.0, "tilt"), tmp_path / "r.bvh")
+    assert (RAISED_REMARK in "; ".join(load(tmp_path / "r.bvh", UP).report.remarks)) == said
