@@ -67,7 +67,7 @@ _SITTING_REMARK = (
 # Largest difference of the legs' lengths, scaled to the figure, and height of one standing foot above the other, that
 # are not reported [m]: a higher foot does not stand (`models.mocap.dynamics.contacts`). The first is at most 0.025 in
 # 210 files, and 0.087 in the one it is from; the second at most 0.042 in 195 of 201 files, and 0.067 to 0.16 in four
-# whose hips are 2 to 4 times as wide as the figure's.
+# whose hips are 3 to 5 times as wide as the figure's.
 _MAX_LEG_DIFFERENCE = 0.045
 _UNEQUAL_REMARK = (
     "the {} leg is {:.0f} cm longer than the other, scaled to the figure, whose legs are equal: one foot is above the "
