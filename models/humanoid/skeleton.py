@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from numbers import Real
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,7 +20,6 @@ import numpy.typing as npt
 from models.errors import ModelError
 
 Pose = npt.NDArray[np.float64]
-Axis = Literal["x", "y", "z"]
 
 # Near de Leva's mean male subject, of 1.741 m and 73.0 kg.
 DEFAULT_STATURE = 1.75  # [m]
@@ -44,8 +43,6 @@ class Segment(NamedTuple):
         Centre of mass in the segment's frame as a share of stature (left side for paired segments).
     gyration : tuple of float
         Radii of gyration about the centre of mass along the frame's x, y, z, as a share of `length`.
-    axis : {"x", "y", "z"}
-        The segment's long axis in the rest pose.
     limit : tuple of three (float, float)
         Range of the joint's rotation vector, component by component [rad] (left side; `joint_range` mirrors it).
     torque : tuple of float
@@ -59,7 +56,6 @@ class Segment(NamedTuple):
     length: float
     com: tuple[float, float, float]
     gyration: tuple[float, float, float]
-    axis: Axis
     limit: tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
     torque: tuple[float, float, float]
 
@@ -77,13 +73,13 @@ def _arm(side: str, first: int) -> tuple[Segment, ...]:
     """Clavicle to hand of the left arm, named for a side; `first` is the clavicle's index in `SEGMENTS`."""
     return (
         Segment(f"{side}_clavicle", f"{side}_clavicle", 2, 0.01, 0.16 / _H, (-0.008, 0.05, -0.006), (0.2, 0.3, 0.3),
-                "y", _deg((-20, 45), (-20, 20), (-30, 30)), (120, 80, 120)),
+                _deg((-20, 45), (-20, 20), (-30, 30)), (120, 80, 120)),
         Segment(f"{side}_upper_arm", f"{side}_shoulder", first, 0.0271, 0.2817 / _H, (0, 0.5772 * 0.2817 / _H, 0),
-                (0.285, 0.158, 0.269), "y", _deg((-120, 120), (-120, 120), (-150, 80)), (100, 70, 100)),
+                (0.285, 0.158, 0.269), _deg((-120, 120), (-120, 120), (-150, 80)), (100, 70, 100)),
         Segment(f"{side}_forearm", f"{side}_elbow", first + 1, 0.0162, 0.2689 / _H, (0, 0.4574 * 0.2689 / _H, 0),
-                (0.276, 0.121, 0.265), "y", _deg((-70, 70), (-100, 100), (-155, 10)), (60, 30, 80)),
+                (0.276, 0.121, 0.265), _deg((-70, 70), (-100, 100), (-155, 10)), (60, 30, 80)),
         Segment(f"{side}_hand", f"{side}_wrist", first + 2, 0.0061, 0.0862 / _H, (0, 0.79 * 0.0862 / _H, 0),
-                (0.628, 0.401, 0.513), "y", _deg((-80, 80), (-40, 40), (-45, 45)), (20, 15, 20)),
+                (0.628, 0.401, 0.513), _deg((-80, 80), (-40, 40), (-45, 45)), (20, 15, 20)),
     )  # fmt: skip
 
 
@@ -91,11 +87,11 @@ def _leg(side: str, first: int) -> tuple[Segment, ...]:
     """Thigh to foot of the left leg, named for a side; `first` is the thigh's index in `SEGMENTS`."""
     return (
         Segment(f"{side}_thigh", f"{side}_hip", 0, 0.1416, 0.4222 / _H, (0, 0, -0.4095 * 0.4222 / _H),
-                (0.329, 0.329, 0.149), "z", _deg((-40, 70), (-140, 45), (-60, 70)), (250, 350, 130)),
+                (0.329, 0.329, 0.149), _deg((-40, 70), (-140, 45), (-60, 70)), (250, 350, 130)),
         Segment(f"{side}_shank", f"{side}_knee", first, 0.0433, 0.434 / _H, (0, 0, -0.4459 * 0.434 / _H),
-                (0.255, 0.249, 0.103), "z", _deg((-15, 15), (-5, 160), (-30, 30)), (300, 350, 150)),
+                (0.255, 0.249, 0.103), _deg((-15, 15), (-5, 160), (-30, 30)), (300, 350, 150)),
         Segment(f"{side}_foot", f"{side}_ankle", first + 1, 0.0137, 0.2581 / _H, (0.034, 0, -0.022),
-                (0.124, 0.245, 0.257), "x", _deg((-40, 40), (-40, 65), (-40, 40)), (120, 300, 100)),
+                (0.124, 0.245, 0.257), _deg((-40, 40), (-40, 65), (-40, 40)), (120, 300, 100)),
     )  # fmt: skip
 
 
@@ -108,13 +104,13 @@ def _mirror(segment: Segment) -> Segment:
 
 # The trunk's masses keep de Leva's sum (43.46 %): the clavicles' 2 % are taken from the upper trunk.
 SEGMENTS: tuple[Segment, ...] = (
-    Segment("pelvis", "root", -1, 0.1117, 0.1457 / _H, (0, 0, 0.3885 * 0.1457 / _H), (0.615, 0.551, 0.587), "z",
+    Segment("pelvis", "root", -1, 0.1117, 0.1457 / _H, (0, 0, 0.3885 * 0.1457 / _H), (0.615, 0.551, 0.587),
             _UNLIMITED, (0, 0, 0)),
-    Segment("abdomen", "abdomen", 0, 0.1633, 0.2155 / _H, (0.003, 0, 0.0565), (0.482, 0.383, 0.468), "z",
+    Segment("abdomen", "abdomen", 0, 0.1633, 0.2155 / _H, (0.003, 0, 0.0565), (0.482, 0.383, 0.468),
             _deg((-35, 35), (-30, 65), (-40, 40)), (200, 300, 150)),
-    Segment("chest", "chest", 1, 0.1396, 0.2421 / _H, (0, 0, 0.062), (0.505, 0.32, 0.465), "z",
+    Segment("chest", "chest", 1, 0.1396, 0.2421 / _H, (0, 0, 0.062), (0.505, 0.32, 0.465),
             _deg((-35, 35), (-30, 50), (-45, 45)), (200, 300, 150)),
-    Segment("head", "head", 2, 0.0694, 0.2429 / _H, (0.008, 0, 0.069), (0.303, 0.315, 0.261), "z",
+    Segment("head", "head", 2, 0.0694, 0.2429 / _H, (0.008, 0, 0.069), (0.303, 0.315, 0.261),
             _deg((-50, 50), (-65, 65), (-80, 80)), (50, 60, 40)),
     *_arm("left", 4),
     *(_mirror(segment) for segment in _arm("right", 8)),

@@ -170,7 +170,8 @@ class _EngineLoop:
         take, self._take = self._take, None
         self._answers.put(messages.Progress("saving the take", 0.5))
         try:
-            self._answers.put(messages.Saved(take.folder, take.end(engine)))
+            take.end(engine)
+            self._answers.put(messages.Saved(take.folder))
         except (SimError, OSError) as error:
             self._answers.put(messages.Refused(str(error)))
 

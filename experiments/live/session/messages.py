@@ -115,10 +115,9 @@ class Refused:
 
 @dataclass(frozen=True)
 class Saved:
-    """A take was saved in its folder; its summary, one sentence per line."""
+    """A take was saved in its folder."""
 
     folder: Path
-    lines: tuple[str, ...]
 
 
 class Board:

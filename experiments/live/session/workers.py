@@ -111,9 +111,8 @@ def verdicts(requests: Any, answers: Any) -> None:
 
 
 class Uploaded(NamedTuple):
-    """Result of preparing a motion file: its name, the file of the clip or None, and a line about it."""
+    """Result of preparing a motion file: the file of the clip or None, and a line about it."""
 
-    name: str
     path: Path | None
     text: str
 
@@ -137,6 +136,6 @@ def preparation(requests: Any, answers: Any) -> None:
             else:
                 said = "; ".join(line.strip() for line in summary(prepare_file(source, target, overwrite=True)))
                 text = f"{said}, {time.perf_counter() - begin:.0f} s in all"
-            answers.put(Uploaded(source.name, target, text))
+            answers.put(Uploaded(target, text))
         except (ModelError, ValueError, ArithmeticError) as error:
-            answers.put(Uploaded(source.name, None, " ".join(str(error).replace(f"{source.parent}/", "").split())))
+            answers.put(Uploaded(None, " ".join(str(error).replace(f"{source.parent}/", "").split())))
