@@ -11,62 +11,6 @@ from experiments.cli import main, parse_command
 from tests.experiments.refused_command import refused
 
 
-@pytest.mark.parametrize(
-    ("flags", "message"),
-    [
-        (["--stiffness", "-5"], "--stiffness is -5; expected 0 N/m or more"),
-        (["--lap", "0"], "lap"),
-        (["--reach", "0.2"], "expected less than 0.0467 m"),
-        (["--radius", "0.3"], "beyond the Phantom's stops"),
-        (["--seconds", "-1"], "-1"),
-        (["--mode", "stretch", "--user", "trace"], "--user relaxed, push or turn"),
-        (["--walls", "--wall-margin", "0.3"], "--wall-margin is 0.3 rad; expected at most 0.261 rad"),
-        (["--mode", "stretch", "--lap", "0.99"], "expected --lap 1.1 or more, or --bump 0.4"),
-        (["--mode", "lead", "--user", "trace"], "leave out --user trace\n"),
-        (
-            ["--mode", "bunny", "--tube", "0.1"],
-            "--tube has no meaning with --mode bunny; it belongs to --mode follow, ",
-        ),
-        (["--smoothing", "1000"], "1000"),
-        (["--physics-step", "0.0003"], "does not divide"),
-        (["--stature", "9"], "stature"),
-        (["--mass", "1"], "mass"),
-        (["--figure", "ghost"], "hvf: --figure is 'ghost'; expected physical, kinematic, none\n"),
-        (["--clips", "moonwalk"], "squat_dance"),
-        (["--clips", "no/such/file.bvh"], "no/such/file.bvh"),
-        (["--clips", *["cheer"] * 5], "1 to 4"),
-        (
-            ["--map", "no/map.npz"],
-            "no/map.npz: cannot be read (No such file or directory); expected the .npz file of a",
-        ),
-    ],
-)
-def test_run_with_invalid_option_is_refused_with_its_value(
-    flags: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    assert message in refused(["run", "--out", str(out), *flags], capsys)
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["live", "--stiffness", "-1"], "--stiffness is -1"),
-        (["certify", "--stiffness", "-1"], "--stiffness is -1"),
-        (["certify", "--hand-push", "-1"], "--hand-push is -1; expected 0 N or more"),
-        (["certify", "--map", "no/map.npz"], "no/map.npz: cannot be read"),
-        (["certify", "--clip", "jump", "--friction", "0"], "--friction is 0"),
-        (["track", "walk", "--seconds", "-1"], "--seconds is -1"),
-        (["lift", "walk", "--seed", "-1"], "--seed is -1"),
-    ],
-)
-def test_other_commands_name_the_invalid_option_or_file(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert message in refused(arguments, capsys)
-
-
 def test_configuration_without_clips_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "mine.json"
     file.write_text('{"map": {"kind": "cylindrical", "clips": []}}', encoding="utf-8")

@@ -11,7 +11,6 @@ from controllers.curves.cylinder import eased_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical, LegsOfOneClip
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
-from controllers.motion.mean import mean_rotation
 from tests.controllers.clips_for_maps import (
     LEG,
     difference,
@@ -201,17 +200,6 @@ def test_walk_advances_by_its_stride_each_lap():
         end = CYLINDRICAL.pose(stylus(*_at(0, s)), memory)
     assert np.linalg.norm(end[:2] - start[:2]) == pytest.approx(3 * 1.3, abs=1e-6)
     np.testing.assert_allclose(difference(end, start)[2:], 0.0, atol=1e-9)
-
-
-def test_mean_rotation_is_the_dominant_eigenvector():
-    stacked = np.stack([clip[:60] for clip, _ in CLIPS], axis=1)
-    weights = np.array([0.1, 0.2, 0.3, 0.4])
-    for frame in range(0, 60, 11):
-        for first in range(3, 19, 4):
-            unit, q = np.ascontiguousarray(stacked[frame, :, first : first + 4]), np.empty(4)
-            mean_rotation(unit, weights, q)
-            moment = np.einsum("m,mx,my->xy", weights, unit, unit)
-            assert abs(q @ np.linalg.eigh(moment).eigenvectors[:, -1]) == pytest.approx(1.0, abs=1e-12)
 
 
 @settings(max_examples=60)

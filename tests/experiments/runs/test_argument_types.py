@@ -2,11 +2,9 @@
 
 import re
 from dataclasses import replace
-from math import inf, nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import hvf
@@ -54,51 +52,6 @@ def test_argument_of_wrong_type_is_refused_by_name(make: Any, name: str) -> None
         if not isinstance(given[name], bool | str):
             with pytest.raises(hvf.HvfError, match=name):
                 make(**given | {name: wrong})
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: hvf.certify(3), "sim is 3; expected Simulation"),  # pyright: ignore
-        (lambda: hvf.certify(SIM, delay="1"), "delay is '1'; expected a number"),  # pyright: ignore
-        (lambda: hvf.certify(SIM, delay=-1.0), "delay must be finite and at least 0 s, got -1.0"),
-        (lambda: hvf.certify(SIM, delay=3.0), "the delay of a loop must be at most 128 periods of 0.001 s, got 3.0 s"),
-        (lambda: hvf.load(None), "path is None; expected text or Path"),  # pyright: ignore
-        (lambda: hvf.clips("walk", 3), "name is 3; expected text or Path"),  # pyright: ignore
-        (lambda: hvf.Person(hand=np.ones(2)), "hand is array([1., 1.]); expected text"),  # pyright: ignore
-        (lambda: hvf.Push(10**400, 1.0, 1.0), "expected a number"),
-        (lambda: hvf.Study.load(3), "path is 3; expected text or Path"),  # pyright: ignore
-        (lambda: hvf.law(3), "a law is made from a function law(hand, …); got 3"),  # pyright: ignore
-        (lambda: hvf.rest_pose("tall"), "stature is 'tall'; expected more than 0 m, and finite"),  # pyright: ignore
-        (lambda: hvf.Cylindrical(DANCE, around=CURVE), "expected a sequence, each Clip"),  # pyright: ignore
-        (lambda: hvf.Composite([DANCE], around=CURVE, reach=-0.1), "reach is -0.1; expected more than 0 m, and finite"),
-        (lambda: hvf.User(intent=hvf.intents.Trace), "expected PersonIntent or None"),  # pyright: ignore
-        (lambda: hvf.Simulation(field=SIM.field, haptic_map=hvf.Cylindrical), "haptic_map is "),  # pyright: ignore
-        (lambda: SIM.run("3"), "seconds is '3'; expected a number"),  # pyright: ignore
-        (lambda: SIM.run(nan), "a run of nan s; expected 0.004 s or more, and finite"),
-        (lambda: SIM.run(3.0, record=3), "record is 3; expected text or Path"),  # pyright: ignore
-        (lambda: SIM.run(3.0, record="a\0b"), "record is 'a\\x00b'; expected a path without a null character"),
-        (lambda: SIM.session(-1.0), "seconds is -1; expected more than 0 s, and finite"),
-        (lambda: SIM.session(inf), "seconds is inf; expected more than 0 s, and finite"),
-        (lambda: hvf.sweep(SIM, {"field.k_r": 300}), "field.k_r is 300; expected a sequence"),  # pyright: ignore
-        (lambda: hvf.sweep(SIM, {"field.k_r": []}), "field.k_r has no values; expected one or more"),
-        (lambda: hvf.tune(3, SPACE, len), "sim is 3; expected Simulation"),  # pyright: ignore
-        (lambda: hvf.tune(SIM, SPACE, 3), "cost is 3; expected a function of a run"),  # pyright: ignore
-        (lambda: hvf.tune(SIM, {"field.k_r": ("a", "b")}, len), "expected a sequence, each a number"),  # pyright: ignore
-        (lambda: hvf.tune(SIM, SPACE, len, panel=(3,)), "expected a sequence, each User"),  # pyright: ignore
-        (lambda: np.ones(2) * SIM.field, "s is array([1., 1.]); expected a number"),
-        (lambda: hvf.circle(lap=1e10), "lap is 1e+10; expected at most 86400 s"),
-        (lambda: hvf.Search(candidates=10**12), "candidates is 1000000000000; expected 1 to 1000000"),
-        (lambda: hvf.Search(candidates=0), "candidates is 0; expected 1 to 1000000"),
-        (lambda: hvf.Search(sampler="best"), "sampler is 'best'; expected one of tpe, cma-es, nsga-ii, random"),  # pyright: ignore
-        (lambda: hvf.Clip(DANCE.poses, "30", "mine"), "30 frames per second; expected a positive number"),  # pyright: ignore
-        (lambda: hvf.Clip(np.array([["1"] * 75]), 30.0, "mine"), "poses are no array of numbers"),
-    ],
-)  # fmt: skip
-def test_message_says_what_is_expected(make: Any, message: str) -> None:
-    with pytest.raises(hvf.HvfError) as error:
-        make()
-    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(("kind", "most"), [(hvf.Cylindrical, 4), (hvf.Composite, 3)])
