@@ -22,7 +22,7 @@ myst_heading_anchors = 3
 exclude_patterns = ["_build"]
 default_role = "py:obj"
 suppress_warnings = [
-    "ref.python",  # `River` in a docstring may be one of three
+    "ref.python"  # `River` in a docstring may be one of three
 ]
 
 autodoc_member_order = "bysource"

@@ -11,10 +11,7 @@ from sim.loop.loop import Loop, Observer
 
 
 def loop_with(
-    config: RunConfig,
-    law: Law,
-    observe: Observer = lambda ticks, frames, n: None,
-    tank: EnergyTank | None = None,
+    config: RunConfig, law: Law, observe: Observer = lambda ticks, frames, n: None, tank: EnergyTank | None = None
 ) -> tuple[Session, Loop]:
     """Session of a configuration with its field replaced, and the loop that runs it.
 

@@ -25,13 +25,7 @@ from controllers.haptic_map.composite import Composite
 from controllers.haptic_map.cylindrical import Cylindrical
 from controllers.haptic_map.lifted import Lifted
 from experiments.fitting.animation_trial import AnimationTrial
-from experiments.fitting.hand_tours import (
-    domain,
-    lap_left_alone,
-    tour_along_curve,
-    tour_duration,
-    tour_of_domain,
-)
+from experiments.fitting.hand_tours import domain, lap_left_alone, tour_along_curve, tour_duration, tour_of_domain
 from experiments.preparation.followed import TRIAL_SECONDS, Followed
 from models.mocap.preparation.bounds import MAX_RESIDUAL_IN_FLIGHTS
 

@@ -9,9 +9,8 @@ from mjviser.conversions import merge_geoms
 from geometry.arrays import Array, IntArray
 from models.world.scene import FIGURE, FIRST_HIDDEN_GROUP, ROBOT
 
-_MAX_TUBE_SHARE = (
-    0.3  # largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside
-)
+# Largest drawn radius of a tube, as a share of the curve's extent: a wider one would hide the inside.
+_MAX_TUBE_SHARE = 0.3
 
 _MIN_STEP = 1e-12  # [m] shortest step between two points that has a direction
 _MIN_POINT_DISTANCE = 1e-4  # [m] between drawn points of a path

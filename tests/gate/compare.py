@@ -64,14 +64,7 @@ def command(case: str, folder: Path) -> list[str]:
     if first == _SCRIPT:
         script, *arguments = others
         return [sys.executable, str(Path(__file__).with_name(script)), out, *arguments]
-    return [
-        sys.executable,
-        "-m",
-        "experiments.cli",
-        first,
-        *others,
-        *(["--out", out] if first == "run" else []),
-    ]
+    return [sys.executable, "-m", "experiments.cli", first, *others, *(["--out", out] if first == "run" else [])]
 
 
 def start(case: str, tree: Path, folder: Path) -> "subprocess.Popen[bytes]":

@@ -104,9 +104,7 @@ def test_captured_clips_alone_and_together_are_exact_at_every_frame():
 
 
 @pytest.mark.slow
-def test_clip_at_rest_at_both_ends_is_lifted_forth_and_back(
-    tmp_path: Path,
-) -> None:
+def test_clip_at_rest_at_both_ends_is_lifted_forth_and_back(tmp_path: Path) -> None:
     bow, share = np.tile(rest_pose(), (61, 1)), 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 61))
     abdomen = 7 + 4 * (BODIES.index("abdomen") - 1)
     bow[:, abdomen], bow[:, abdomen + 2] = np.cos(0.3 * share), np.sin(0.3 * share)

@@ -109,10 +109,7 @@ def test_invalid_arm_numbers_are_refused(tmp_path: Path, capsys: pytest.CaptureF
     ("words", "message"),
     [
         ("--figure kinematic", "a robot arm takes the figure's place; leave out --figure kinematic"),
-        (
-            "--stature 1.75",
-            "--stature 1.75 has no meaning with a robot arm; it belongs to --figure physical,",
-        ),
+        ("--stature 1.75", "--stature 1.75 has no meaning with a robot arm; it belongs to --figure physical,"),
         ("--blend 0.4", "--blend 0.4 has no meaning with a robot arm"),
         ("--clips walk", "--clips has no meaning with --mode follow --map robot-arm; it belongs to --map cylindrical"),
         ("--walls", "--walls is for a figure, and a robot arm is in its place"),

@@ -16,16 +16,7 @@ from geometry.arrays import Array
 from sim.recording.recording import Recording
 from sim.viewer.actor import Actor
 from sim.viewer.live_stage import GHOST_AT
-from tests.live.browser import (
-    ServedPage,
-    choose,
-    control_beside,
-    drag,
-    fill,
-    new_tab,
-    on_screen,
-    save_screenshot,
-)
+from tests.live.browser import ServedPage, choose, control_beside, drag, fill, new_tab, on_screen, save_screenshot
 
 pytestmark = pytest.mark.processes
 

@@ -60,9 +60,7 @@ def type_value(slider: Any, value: float) -> None:
     slider.moved(None)
 
 
-def test_number_beyond_slider_is_refused_and_the_gain_restored(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_number_beyond_slider_is_refused_and_the_gain_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     panel, desk, slider = make_panel()
     type_value(slider, 400.0)
     with pytest.raises(ParameterError, match="k_r is 20000; expected 10 to 12000 N/m"):

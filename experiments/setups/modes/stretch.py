@@ -39,9 +39,8 @@ _MIN_BUMP, _BUMP_SHARE = 0.5, 0.125  # default half width of a bend: that of a l
 PRESS_RATIO = 2.2
 EASE_TIME = 1.0  # [s] in which the bent curve reaches its pace: a figure in mid-step cannot resume full speed at once
 _MAX_BUMP_SLOPE = 2.0  # steepest slope of a bump of height and half width 1, rounded up
-_MIN_FLIGHT_DURATION = (
-    0.05  # [s] shortest flight of a clip that counts: half or twice the value changes none of eight captures
-)
+# [s] shortest flight of a clip that counts: half or twice the value changes none of eight captures
+_MIN_FLIGHT_DURATION = 0.05
 
 
 def stretch_parts(config: RunConfig, mode: Stretch, maps: ClipMapParts) -> Parts:

@@ -67,9 +67,8 @@ def speeds_along(maps: ClipMapParts, curve: Trajectory, river: int = 0, course: 
     ModelError
         If the map's poses are not the figure's.
     """
-    from experiments.flights.ballistics import (
-        clip_ballistics,  # statistics take long to import, for a run without a governor
-    )
+    # Statistics take long to import, for a run without a governor.
+    from experiments.flights.ballistics import clip_ballistics
 
     clip, led = animation_along(maps.haptic_map, curve, river), curve if course is None else course
     shown = np.linspace(led.start, led.end, clip.n_frames)

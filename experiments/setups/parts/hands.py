@@ -128,9 +128,8 @@ def user_hand(
         intent = ChangeOver(other) if isinstance(intent, ChangeOver) else intent
         return participant(user.person, intent, curve, seconds, seed)
     if user.does == "trace":
-        times = np.arange(
-            0.0, seconds + 2.0 * TRACE_SAMPLE_TIME, TRACE_SAMPLE_TIME
-        )  # beyond the end, where a path rests
+        # Beyond the end, where a path rests.
+        times = np.arange(0.0, seconds + 2.0 * TRACE_SAMPLE_TIME, TRACE_SAMPLE_TIME)
         return Arm(path=curve.point(times), period=TRACE_SAMPLE_TIME, pushes=user.pushes, turns=user.turns)
     return Arm(pushes=user.pushes, grabs=user.grabs, turns=user.turns)
 

@@ -3,12 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers.blending.pair_corrections import (
-    neighbouring_pairs,
-    packed_pairs,
-    pair_channels,
-    pair_correction,
-)
+from controllers.blending.pair_corrections import neighbouring_pairs, packed_pairs, pair_channels, pair_correction
 from controllers.legs.footfalls import foot_corrections
 from tests.controllers.legs.test_footfalls import LEGS, REST, N, kicking, walking
 from tests.derivatives import central_differences

@@ -11,16 +11,7 @@ from controllers.fields.algebra.walker_feed import feed_walkers
 from controllers.fields.leading import Leading, LeadingGains, PathPoint, leading_force
 from controllers.state import HandState
 from controllers.walking.gait import Gait
-from controllers.walking.walked_path import (
-    PATH_HEADING,
-    PATH_X,
-    PATH_Y,
-    ROWS,
-    STEP,
-    path_back,
-    path_front,
-    path_value,
-)
+from controllers.walking.walked_path import PATH_HEADING, PATH_X, PATH_Y, ROWS, STEP, path_back, path_front, path_value
 from controllers.walking.walker import walker_at
 from controllers.walking.walking import Walking
 from tests.controllers.fields.field_probes import force_of, largest_jump

@@ -11,14 +11,7 @@ from controllers.curves.cylinder import eased_weight
 from controllers.errors import ParameterError
 from controllers.haptic_map.cylindrical import Cylindrical, LegsOfOneClip
 from controllers.motion.lap import LAP_HEADING, LAP_X, LAPS
-from tests.controllers.clips_for_maps import (
-    LEG,
-    difference,
-    matrices,
-    numeric_jacobian,
-    stylus,
-    swinging,
-)
+from tests.controllers.clips_for_maps import LEG, difference, matrices, numeric_jacobian, stylus, swinging
 from tests.controllers.example_maps import CLIPS, CORNERS, CYLINDRICAL, CYLINDRICAL_ARMS, R, Z
 from tests.derivatives import central_differences
 

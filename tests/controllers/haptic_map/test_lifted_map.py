@@ -64,10 +64,7 @@ def test_clips_are_displaced_rigidly_over_the_ground():
         ({"angles": [*ANGLES[:3], ANGLES[3][:-1]]}, r"clip cut has 140 frames, its angles have shape \(139,\)"),
         ({"angles": [*ANGLES[:3], ANGLES[3][::-1]]}, "must be finite and increase"),
         ({"angles": [*ANGLES[:3], angles_once_round(140, 0.3, TURN)]}, "leave a gap of 0.05 rad or more"),
-        (
-            {"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]},
-            "clip cut: two of its frames are 3.12 rad",
-        ),
+        ({"angles": [*ANGLES[:3], np.append(ANGLES[3][:-1] / 3.0, 5.0)]}, "clip cut: two of its frames are 3.12 rad"),
         ({"sites": ring(4)[:4]}, r"sites must have shape \(rows ≥ 8, 4 clips, 2: r and z\), got \(4, 4, 2\)"),
         ({"sites": ring(4) * np.nan}, "sites must be finite"),
         ({"sites": ring(4, centre=(0.012, 0.0))}, "from the axis, where the phase is not defined"),
@@ -104,10 +101,7 @@ def test_legs_are_of_one_clip_and_arms_have_their_share_of_the_others(share):
         pose = owned.pose(x)
         np.testing.assert_allclose(difference(pose, alone)[:9], 0.0, atol=1e-9)
         # The chordal mean of clips is the dominant eigenvector of their weighted sum of q qᵀ (Markley et al. 2007).
-        weights, moments = (
-            share * WITHOUT_LIMBS.weights(x) + (1.0 - share) * np.eye(4)[owner],
-            np.zeros((2, 4, 4)),
-        )
+        weights, moments = (share * WITHOUT_LIMBS.weights(x) + (1.0 - share) * np.eye(4)[owner], np.zeros((2, 4, 4)))
         for i, weight in enumerate(weights):
             at = WITHOUT_LIMBS.site(i, np.array(angle))
             clip = WITHOUT_LIMBS.pose(stylus(at[0], angle, at[1]))[11:].reshape(2, 4)

@@ -14,9 +14,7 @@ RESULTS = (
 )
 
 
-def test_check_prints_verdicts_and_fails_if_any_benchmark_fails(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_check_prints_verdicts_and_fails_if_any_benchmark_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert [result.passes for result in RESULTS] == [True, False, None]
     assert print_results(RESULTS, False, True) == 1
     lines = capsys.readouterr().out.splitlines()

@@ -1,4 +1,4 @@
-"""Messages of the Python interface say what is expected, and name keywords where those of the command line name options."""
+"""Messages from Python say what is expected, and name keywords where those of the command line name options."""
 
 import re
 import warnings
@@ -201,10 +201,7 @@ def test_messages_use_keywords_in_python_and_options_on_the_command_line(
     assert "choose another --out, or --overwrite it" in capsys.readouterr().err
     for keyword_arguments, message in (
         ({"foo": 3}, "^foo is not known; there are "),
-        (
-            {"figure": "none", "smoothing": 6.0},
-            '^smoothing=6.0 has no meaning with figure="none"; it belongs',
-        ),
+        ({"figure": "none", "smoothing": 6.0}, '^smoothing=6.0 has no meaning with figure="none"; it belongs'),
         ({"mode": "lead", "clips": ["walk", "run"]}, "^got 2 clips; expected one to lead, such as walk or run$"),
         ({"stiffness": -1.0}, "^stiffness is -1; expected 0 N/m or more"),
     ):

@@ -35,14 +35,7 @@ from experiments.config.options import (
 )
 from experiments.config.part import above, at_least, from_dict, from_json, part, to_dict, to_json, whole_number
 from experiments.config.paths import load_config
-from experiments.config.run_config import (
-    Clock,
-    Figure,
-    Phantom,
-    Replay,
-    RunConfig,
-    User,
-)
+from experiments.config.run_config import Clock, Figure, Phantom, Replay, RunConfig, User
 from experiments.hardware.parts import served, session_of
 from experiments.setups.wiring import wire
 from sim.errors import SimError

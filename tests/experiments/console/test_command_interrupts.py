@@ -109,10 +109,7 @@ def test_ctrl_c_keeps_finished_trials_and_the_study_resumes(tmp_path: Path) -> N
     database = f"file:{tmp_path / 'study' / DATABASE}?mode=ro"
 
     def stored_trials() -> int:
-        with (
-            contextlib.suppress(sqlite3.OperationalError),
-            sqlite3.connect(database, uri=True) as rows,
-        ):
+        with contextlib.suppress(sqlite3.OperationalError), sqlite3.connect(database, uri=True) as rows:
             return rows.execute("select count(*) from trials").fetchone()[0]
         return 0
 

@@ -104,10 +104,7 @@ def test_robot_arm_run_announces_its_units_before_wiring():
     ("config", "more"),
     [
         (run_config(), ["cylindrical_map", "follow_wrench", "_poses_along"]),
-        (
-            run_config(mode="bunny", expressive=True),
-            ["express", "cylindrical_map", "bunny_wrench"],
-        ),
+        (run_config(mode="bunny", expressive=True), ["express", "cylindrical_map", "bunny_wrench"]),
         (run_config(mode="rivers", map="rivers"), ["river_clips_map", "_derivatives", "_reference_along"]),
         (run_config(mode="lead"), ["led_map", "leading_wrench", "follow_hand", "_poses_along"]),
         (run_config(mode="stretch"), ["stretchy_wrench", "lower_start"]),

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 from controllers.certificates.loop.hand import HandRange
-from controllers.certificates.report import (
-    Certificate,
-    CertificateError,
-    ChangedInputs,
-    Verdict,
-    hash_of,
-    hashes_of,
-)
+from controllers.certificates.report import Certificate, CertificateError, ChangedInputs, Verdict, hash_of, hashes_of
 from controllers.safety.arming import TRANSITIONS
 from experiments.certify.certified_clips import run_and_clips
 from experiments.certify.certified_field import certificate_inputs, certified_options

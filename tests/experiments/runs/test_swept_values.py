@@ -40,11 +40,7 @@ def test_force_bound_of_limited_field_is_set() -> None:
         np.testing.assert_array_equal(other.field.wrench(hand).force, by_hand.wrench(hand).force)
     assert np.linalg.norm(sim.field.wrench(hand).force) == pytest.approx(8.0)
     for field, path, message in (
-        (
-            level + level,
-            "limited.force",
-            r"^field.limited.force: .* limited 0 times; expected limited.force or",
-        ),
+        (level + level, "limited.force", r"^field.limited.force: .* limited 0 times; expected limited.force or"),
         (level.limited(1.0).limited(2.0), "limited.force", "is limited 2 times"),
         (level.limited(1.0), "limited.power", "expected limited.force or limited.torque"),
         (level.limited(1.0), "limited", "expected limited.force or limited.torque"),

@@ -23,9 +23,7 @@ def _angle(out: Path, flow: Literal["curve", "parallel"], user: Literal["push", 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("without_page")
-def test_pushed_hand_keeps_its_angle_only_in_parallel_flow(
-    tmp_path: Path,
-) -> None:
+def test_pushed_hand_keeps_its_angle_only_in_parallel_flow(tmp_path: Path) -> None:
     lag = {
         flow: float(np.abs(_angle(tmp_path, flow, "push") - _angle(tmp_path, flow, "relaxed")).max())
         for flow in ("parallel", "curve")

@@ -19,9 +19,7 @@ def test_tracking_remarks_only_for_a_physical_figure() -> None:
     assert falls.refine(physical=False).remarks == parts.remarks
 
 
-def test_single_clip_off_its_pace_is_tried_and_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_single_clip_off_its_pace_is_tried_and_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """The run has flights; 2.2 s and 1.47 s are whole numbers of its strides, 1.8 s is off both by 20 %."""
     monkeypatch.setattr(AnimationTrial, "followed", lambda _: Followed(0.2, 1.5))
     own = embedded("run").duration

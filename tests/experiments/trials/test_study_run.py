@@ -156,11 +156,7 @@ def test_trial_key_covers_the_smoothness_code() -> None:
 
 @pytest.mark.parametrize(
     ("threads", "workers", "cluster", "message"),
-    [
-        (2, 2, None, "threads and workers contradict"),
-        (0, None, None, "threads is 0"),
-        (None, 0, None, "workers is 0"),
-    ],
+    [(2, 2, None, "threads and workers contradict"), (0, None, None, "threads is 0"), (None, 0, None, "workers is 0")],
 )
 def test_contradictory_executors_are_refused_without_output(
     tmp_path: Path, threads: int | None, workers: int | None, cluster: str | None, message: str

@@ -73,11 +73,7 @@ def test_convert_can_overwrite_its_source(figure_file):
 
 @pytest.mark.parametrize(
     ("hints", "option"),
-    [
-        (Hints(up="+Y"), "--up"),
-        (Hints(rest_frame=2), "--rest-frame"),
-        (Hints(roles=Path("roles.toml")), "--roles"),
-    ],
+    [(Hints(up="+Y"), "--up"), (Hints(rest_frame=2), "--rest-frame"), (Hints(roles=Path("roles.toml")), "--roles")],
 )
 def test_convert_refuses_hints_that_a_file_of_the_figure_determines_itself(figure_file, tmp_path, hints, option):
     with pytest.raises(MotionFileError, match=rf"the figure's own skeleton.*expected no {option}"):

@@ -25,11 +25,7 @@ class Miswired(FaultyDriver):
 
     def __init__(self, driver: EmulatedPhantom, torque: Wiring, reading: Wiring, delay_ticks: int = 0):
         super().__init__(driver)
-        self.torque, self.tamper, self.tips = (
-            torque,
-            lambda row: _rewire(row, reading),
-            list[np.ndarray](),
-        )
+        self.torque, self.tamper, self.tips = (torque, lambda row: _rewire(row, reading), list[np.ndarray]())
         self._delayed = [(np.zeros(3), False)] * delay_ticks
 
     def write(self, torque: np.ndarray, enable: bool) -> None:

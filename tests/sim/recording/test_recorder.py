@@ -202,10 +202,7 @@ def test_failed_header_leaves_no_file(tmp_path):
     ],
 )
 def test_blocks_of_an_undeclared_shape_are_refused(tmp_path, group, change, message):
-    with (
-        Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder,
-        pytest.raises(RecordingError, match=message),
-    ):
+    with Recorder(tmp_path / "run.h5", {}, 1, GROUPS, {}) as recorder, pytest.raises(RecordingError, match=message):
         recorder.append(group, block(0, 5) | change)
 
 

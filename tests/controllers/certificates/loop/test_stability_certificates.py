@@ -111,9 +111,7 @@ def test_linearised_tube_law_matches_finite_differences_of_the_kernels(kind):
             central_differences(lambda x, rate=rate, torque=torque: torque(x, rate), theta, 1e-6), by_theta, atol=2e-5
         )
         np.testing.assert_allclose(
-            central_differences(lambda x, theta=theta, torque=torque: torque(theta, x), rate, 1e-6),
-            by_omega,
-            atol=1e-7,
+            central_differences(lambda x, theta=theta, torque=torque: torque(theta, x), rate, 1e-6), by_omega, atol=1e-7
         )
 
 

@@ -198,8 +198,7 @@ def test_code_digest_depends_on_closure_constants_and_functions():
 
 
 @pytest.mark.parametrize(
-    "body",
-    ["return [gain * x for x in hand.p]", "return list(map(lambda x: gain * x, hand.p))", "return helper(hand)"],
+    "body", ["return [gain * x for x in hand.p]", "return list(map(lambda x: gain * x, hand.p))", "return helper(hand)"]
 )
 def test_code_digest_depends_on_globals_read_within_and_on_keyword_defaults(body):
     def digest(gain):

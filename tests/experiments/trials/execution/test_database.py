@@ -37,10 +37,7 @@ def test_damaged_row_is_named(tmp_path: Path, change: str) -> None:
     plain = sqlite3.connect(tmp_path / "s.sqlite", isolation_level=None)
     plain.execute(f"UPDATE trials SET {change}")
     plain.close()
-    with (
-        opened(tmp_path / "s.sqlite") as database,
-        pytest.raises(StudyError, match=r"row 'k'.* is damaged .* delete"),
-    ):
+    with opened(tmp_path / "s.sqlite") as database, pytest.raises(StudyError, match=r"row 'k'.* is damaged .* delete"):
         list(database.rows())
 
 
