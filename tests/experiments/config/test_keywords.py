@@ -149,6 +149,14 @@ def person_session(**does: Any) -> Any:
         (lambda: hvf.Composite([CHEER], around=CURVE, reach=-0.1), "reach is -0.1; expected more than 0 m, and finite"),
         (lambda: hvf.User(intent=hvf.intents.Trace), "expected PersonIntent or None"),  # pyright: ignore
         (lambda: hvf.Simulation(field=SIM.field, haptic_map=hvf.Cylindrical), "haptic_map is "),  # pyright: ignore
+        (lambda: replace(SIM, field=lambda hand: (0, 0, 0)), "; expected a law of force, "),
+        (lambda: replace(SIM, haptic_map=CHEER), "haptic_map is <clip 'cheer'"),
+        (lambda: replace(SIM, figure="none"), "figure is 'none'; expected hvf.Figure"),
+        (lambda: replace(SIM, user=None), "user is None"),
+        (lambda: replace(SIM, seed=1.5), "seed is 1.5; expected a whole number"),
+        (lambda: replace(SIM, seed=-1), "seed is -1"),
+        (lambda: SIM.run(0.001), "expected 0.004 s or more"),
+        (lambda: SIM.run(1e300), "expected less than"),
         (lambda: SIM.run("3"), "seconds is '3'; expected a number"),  # pyright: ignore
         (lambda: SIM.run(3.0, record=3), "record is 3; expected text or Path"),  # pyright: ignore
         (lambda: SIM.run(3.0, record="a\0b"), "record is 'a\\x00b'; expected a path without a null character"),

@@ -1,6 +1,8 @@
 """Simulations from Python: runs in memory, their results, sweeps, ticks, own maps that fail, replay in a notebook."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -125,20 +127,44 @@ def test_run_in_a_relative_folder_is_read_from_any_working_directory(
     assert run.ticks["p"].shape == (100, 3)
 
 
-def test_failing_run_leaves_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Failing(hvf.HapticMap):
-        def pose(self, x: np.ndarray) -> np.ndarray:
-            if x[1] > 1e-3:
-                raise ValueError("beyond what this map was made for")
-            return hvf.rest_pose()
+class Failing(hvf.HapticMap):
+    """A map that fails once the hand has moved: `fails` raises, or returns what is no pose."""
 
+    def __init__(self, fails: Callable[[], Any]):
+        self.fails = fails
+
+    def pose(self, x: np.ndarray) -> np.ndarray:
+        return self.fails() if x[1] > 1e-3 else hvf.rest_pose()
+
+
+def no_such_place() -> None:
+    raise ValueError("no such place")
+
+
+def ctrl_c() -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("fails", "kind", "message"),
+    [
+        (no_such_place, ValueError, "no such place"),
+        (ctrl_c, KeyboardInterrupt, None),
+        (lambda: np.zeros(3), hvf.ParameterError, r"gave a pose of shape \(3,\) at p = .*; expected 75 finite numbers"),
+    ],
+)
+def test_failing_own_map_ends_the_run_and_leaves_no_folder(
+    fails: Callable[[], Any],
+    kind: type[BaseException],
+    message: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    moves = hvf.Simulation(
-        field=hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8), haptic_map=Failing(),
-        figure=hvf.Figure(kind="kinematic"),
-    )  # fmt: skip
-    with pytest.raises(ValueError, match="beyond what this map"):
-        moves.run(0.5)
+    field = hvf.Follow(hvf.circle(lap=2.0), k_r=300, b_d=8)
+    sim = hvf.Simulation(field=field, haptic_map=Failing(fails), figure=hvf.Figure(kind="kinematic"))
+    with pytest.raises(kind, match=message):
+        sim.run(0.5)
     assert not list(tmp_path.iterdir())
 
 
@@ -158,22 +184,10 @@ def test_simulation_is_iterated_tick_by_tick(sim: hvf.Simulation) -> None:
     np.testing.assert_allclose(np.diff(times), 1e-3, atol=1e-12)
 
 
-def test_errors_of_own_map_end_the_run() -> None:
-    class Fails(hvf.HapticMap):
-        def pose(self, x):
-            if x[1] > 0.0:
-                raise ValueError("no such place")
-            return hvf.rest_pose()
-
-    curve = hvf.circle(lap=1.0)
-    field = hvf.Follow(curve, k_r=300, b_d=8)
-    failing = hvf.Simulation(field=field, haptic_map=Fails(), figure=hvf.Figure(kind="kinematic"))
-    with pytest.raises(ValueError, match="no such place"):
-        failing.run(0.5)
-
+def test_own_map_of_another_size_than_the_figure_is_refused() -> None:
     class Small(hvf.HapticMap):
         def pose(self, x):
             return np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
     with pytest.raises(hvf.ParameterError, match="poses of Small have 7 numbers; the figure's have 75"):
-        hvf.Simulation(field=field, haptic_map=Small()).run(0.5)
+        hvf.Simulation(field=hvf.Follow(hvf.circle(), k_r=300, b_d=8), haptic_map=Small()).run(0.5)

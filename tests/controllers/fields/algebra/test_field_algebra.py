@@ -87,7 +87,7 @@ def test_sums_differences_and_quotients_match_their_formulas():
     np.testing.assert_array_equal(force_of(A / 4, HAND), 0.25 * F)
     np.testing.assert_array_equal(force_of(sum([A, B, A]), HAND), F + G + F)
     assert sum([A]) is A
-    assert (A / 4).description() == (0.25 * A).description()
+    assert (A / 4).description() == (0.25 * A).description() == (A * 0.25).description()
     compiled = CompiledLaw(lambda hand: (hand.p[0], 0.0, 0.0))
     np.testing.assert_allclose((-compiled - A / 2).wrench(HAND).force, [-0.04, 0.0, 0.0] - 0.5 * F, rtol=1e-12)
 
