@@ -34,6 +34,8 @@ WALK = ROOT / "models" / "mocap" / "clips" / "walk.bvh"
         (["run", "--radius", "0.3"], "beyond the Phantom's stops"),
         (["run", "--mode", "stretch", "--user", "trace"], "--user relaxed, push or turn"),
         (["run", "--mode", "lead", "--user", "trace"], "leave out --user trace\n"),
+        (["run", "--mode", "lead", "--clips", "walk", "run"], "got 2 --clips; expected one to lead"),
+        (["run", "--mode", "lead", "--clips", "cheer"], "hvf: a clip that is led must go somewhere"),
         (["run", "--walls", "--wall-margin", "0.3"], "--wall-margin is 0.3 rad; expected at most 0.261 rad"),
         (["run", "--smoothing", "1000"], "1000"),
         (["run", "--physics-step", "0.0003"], "does not divide"),

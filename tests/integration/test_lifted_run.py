@@ -132,13 +132,3 @@ def test_lap_option_with_lifted_map_is_refused(
     assert main(["run", "--map", str(map_file), "--lap", "3", "--out", str(tmp_path / "run")]) == 2
     assert "leave out --lap and --radius" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
-
-
-def test_push_on_a_map_without_transition_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = str(tmp_path / "one.npz")
-    assert main(["lift", "walk", "--out", out]) == 0
-    capsys.readouterr()
-    assert main(["run", "--map", out, "--mode", "rivers", "--user", "push", "--out", str(tmp_path / "run")]) == 2
-    error = capsys.readouterr().err
-    assert "the curve 'walk' has no transition to push over at; there are: none" in error
-    assert len(error.strip().splitlines()) == 1

@@ -117,20 +117,8 @@ def test_recording_with_altered_gain_is_not_reproduced(
 
 def test_killed_run_keeps_its_recording_and_can_be_reported(tmp_path: Path) -> None:
     out = tmp_path / "killed"
-    command = [
-        sys.executable,
-        "-m",
-        "experiments.cli",
-        "run",
-        "--clips",
-        "cheer",
-        "--figure",
-        "kinematic",
-        "--seconds",
-        "600",
-        "--out",
-        str(out),
-    ]
+    options = ["--clips", "cheer", "--figure", "kinematic", "--seconds", "600", "--out", str(out)]
+    command = [sys.executable, "-m", "experiments.cli", "run", *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     for _ in range(600):
         time.sleep(0.5)

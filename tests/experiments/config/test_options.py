@@ -228,6 +228,7 @@ def _configs_of_all_kinds() -> list[RunConfig]:
              for lead, clips in ((Lead(), ("walk",)), (Lead(leash=90.0, floor_scale=70.0), ("run",)))]  # fmt: skip
     arm, by_arm = RobotArm(around=Circle(lap=3.0), reach=0.02, scale=1.2), Figure(smoothing=5.0, figure_ticks=4)
     configs += [RunConfig(mode=mode, map=arm, figure=by_arm) for mode in (Follow(), Rivers(stiffness=99.0))]
+    configs.append(run_config(mode="bunny", replay="runs/mine"))
     configs.append(RunConfig(
         figure=Figure(stature=1.6, mass=60.0, smoothing=5.0, figure_ticks=4, blend=0.0), device=Phantom(cutoff=99.0),
         clock=Clock(servo_period=2e-3, physics_step=5e-4), seconds=3.0, seed=2**63 - 1,

@@ -12,8 +12,8 @@ import pytest
 
 import hvf
 from experiments.cli import main
-from experiments.config.options import options_of, run_config, with_options
-from experiments.config.part import from_dict, to_dict
+from experiments.config.options import run_config, with_options
+from experiments.config.part import from_dict
 from experiments.config.run_config import RunConfig, User
 from experiments.runs.reproduce import reproduce
 from experiments.setups.wiring import wire
@@ -154,12 +154,6 @@ def test_replay_is_reproduced_only_while_its_recording_is_unchanged(recorded: hv
 def test_replay_option_replaces_the_user() -> None:
     config = run_config(user="push", seconds=2.0, cutoff=100.0)
     assert with_options(config, {"replay": "runs/mine"}) == run_config(replay="runs/mine", seconds=2.0)
-
-
-def test_replay_round_trips_through_words_and_dict() -> None:
-    config = run_config(mode="bunny", replay="runs/mine")
-    assert run_config(**options_of(config)) == config  # pyright: ignore[reportArgumentType]
-    assert from_dict(RunConfig, to_dict(config), "here") == config
 
 
 def test_device_without_kind_is_a_phantom() -> None:

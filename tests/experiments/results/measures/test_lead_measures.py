@@ -7,10 +7,8 @@ from typing import ClassVar, cast
 import numpy as np
 import pytest
 
-from controllers.errors import ParameterError
 from controllers.haptic_map.led import Led
 from controllers.walking.gait import Gait
-from experiments.cli import main
 from experiments.config.maps import Led as LedMap
 from experiments.config.modes import Lead
 from experiments.config.options import run_config
@@ -23,7 +21,6 @@ from experiments.setups.modes.lead import lead_parts, leading, walker_argument
 from experiments.setups.parts import clips
 from experiments.setups.parts.leading_hand import leading_hand, s_curve
 from experiments.setups.parts.led_figure import gait_remark, led_clips, led_map, led_parts
-from experiments.setups.wiring import wire
 from models.humanoid.skeleton import figure_model, rest_pose
 from models.mocap.dynamics.contacts import contacts
 from models.mocap.library import embedded
@@ -244,23 +241,6 @@ def test_led_hand_feels_what_the_motors_give_not_what_the_field_asks_for() -> No
     ).force_max == pytest.approx(2.5)
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"map": "composite"}, "leave out --map"),
-        ({"user": "push"}, "--user push"),
-        ({"walls": True}, "--walls has no meaning with --mode lead"),
-        ({"clips": ("walk", "run")}, "got 2 --clips; expected one to lead"),
-        ({"clips": ("cheer",)}, "must go somewhere"),
-        ({"floor_scale": -1.0}, "floor_scale is -1; expected 0.001 or more, and finite"),
-        ({"leash": -1.0}, "leash is -1; expected 0 N/m or more, and finite"),
-    ],
-)
-def test_invalid_lead_options_are_refused(options: dict, message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        wire(run_config(mode="lead", **options))
-
-
 def test_resolved_configuration_contains_the_floor_scale() -> None:
     config = run_config(mode="lead")
     assert isinstance(config.map, LedMap)
@@ -268,10 +248,3 @@ def test_resolved_configuration_contains_the_floor_scale() -> None:
     resolved = lead_parts(config, Lead(), maps).config
     assert isinstance(resolved, RunConfig)
     assert resolved.mode == Lead(floor_scale=leading(Lead(), maps.gait).walking.scale)
-
-
-def test_command_refuses_a_clip_without_travel(tmp_path, capsys) -> None:
-    code = main(["run", "--mode", "lead", "--clips", "cheer", "--out", str(tmp_path / "run")])
-    assert code == 2
-    assert "hvf: a clip that is led must go somewhere" in capsys.readouterr().err
-    assert not (tmp_path / "run").exists()

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-import pytest
 
 from controllers.curves.trajectory import Trajectory
 from controllers.fields.algebra.instructions import TRACE_RIVER
@@ -13,10 +12,9 @@ from controllers.fields.follow import Follow
 from controllers.fields.higher_order import HigherOrder
 from controllers.state import HAND_POSITION, HAND_SIZE, HAND_VELOCITY
 from experiments.config.modes import Follow as FollowMode
-from experiments.config.modes import Rivers
 from experiments.config.options import run_config
-from experiments.setups.modes.rivers import drawn, river_bundle, river_time
-from experiments.setups.parts.defaults import resolved, river_gains
+from experiments.setups.modes.rivers import drawn, river_bundle
+from experiments.setups.parts.defaults import resolved
 from experiments.setups.parts.part_types import ClipMapParts, Parts
 from experiments.setups.setups import map_parts, parts_of
 from models.humanoid.skeleton import figure_model
@@ -62,14 +60,6 @@ def test_rivers_and_follow_have_separate_default_gains() -> None:
         alone = parts_with("follow", **words).field
         assert isinstance(alone, Follow)
         assert (alone.k_r, alone.b_d) == expected
-
-
-def test_rivers_of_map_files_have_separate_default_gains() -> None:
-    for words, expected in (({}, (50.0, 20.0)), ({"stiffness": 40.0, "damping": 10.0}, (40.0, 10.0))):
-        mode = resolved(run_config("rivers", "any.npz", "push", **words)).mode
-        assert isinstance(mode, Rivers)
-        assert river_gains(mode) == expected
-        assert river_time(mode) == pytest.approx(expected[1] / expected[0])
 
 
 def test_default_flow_of_follow_depends_on_the_map() -> None:
