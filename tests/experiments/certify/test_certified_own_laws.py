@@ -285,13 +285,10 @@ def test_cases_that_differ_beyond_the_sixth_digit_are_distinct():
     ("function", "message"),
     [
         (_boom, r"law _boom \(.*\) raised ValueError: boom"),
-        (lambda hand: (1.0, 2.0), r"numbers of shape \(2,\)"),
-        (lambda hand: None, "returned None; expected a return statement with three numbers"),
-        (lambda hand: ("a", 0, 0), r"gave \('a', 0, 0\)"),
         (lambda hand: (1.0 / (hand.t - hand.t), 0, 0), "raised ZeroDivisionError"),
     ],
 )
-def test_law_that_raises_or_returns_wrong_shape_is_named_in_the_error(function, message):
+def test_law_that_raises_is_named_in_the_error(function, message):
     with pytest.raises(ParameterError, match=message):
         stability(function)
 

@@ -21,19 +21,14 @@ from controllers.fields.own.compiled_law import CompiledLaw
 from controllers.fields.stretchy_tubes import StretchyTubes
 from experiments.certify.trial_simulation import LAP_DURATION, Conditions, LoopTrial, simulate
 from experiments.cli import main
-from models.mocap.library import embedded
 from tests.controllers.rivers_for_certificates import CIRCLE, river
+from tests.experiments.certify.test_certified_simulation import simulation
 
 TRIAL_CURVE = Trajectory.circle(0.0477, LAP_DURATION)
 
 
 # Without encoder rounding, which would add spurious accelerations to the path.
 WITH_FRICTION = Conditions(8, mujoco.mjtIntegrator.mjINT_IMPLICITFAST, coulomb=True)
-
-
-def simulation(field):
-    clips = [embedded("walk")]
-    return hvf.Simulation(field=field, haptic_map=hvf.Cylindrical(clips, around=CIRCLE), figure=hvf.Figure(kind="none"))
 
 
 @pytest.mark.slow

@@ -2,12 +2,9 @@
 
 import contextlib
 import os
-import signal
 import sqlite3
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,28 +12,7 @@ import pytest
 from experiments.cli import main
 from experiments.trials.study import DATABASE
 from sim.recording.recording import Recording
-
-
-def _default_interrupt() -> None:
-    """Undo the ignored SIGINT that a child of a background shell inherits."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def stderr_of_interrupted(words: list[str], ready: Callable[[], bool], wait: float) -> str:
-    """stderr of a command that gets SIGINT `wait` seconds after it is ready."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "experiments.cli", *words], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-        start_new_session=True, preexec_fn=_default_interrupt,
-    )  # fmt: skip
-    deadline = time.monotonic() + 120.0
-    while not ready() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    time.sleep(wait)
-    os.killpg(process.pid, signal.SIGINT)
-    stderr = process.communicate(timeout=60)[1]
-    assert process.returncode == 130, stderr
-    return stderr
-
+from tests.experiments.own_process import default_interrupt, stderr_of_interrupted
 
 WHERE_INTERRUPTS_ARE_LOST = {
     "import": "import interrupted",  # which would turn it into another error
@@ -69,7 +45,7 @@ except KeyboardInterrupt:
     print("stopped")
 """
     completed = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, preexec_fn=_default_interrupt,
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, preexec_fn=default_interrupt,
         cwd=tmp_path, env=os.environ | {"PYTHONPATH": os.pathsep.join([str(Path.cwd()), str(tmp_path)])}, check=False,
     )  # fmt: skip
     assert (completed.stdout, completed.stderr) == ("stopped\n", "")

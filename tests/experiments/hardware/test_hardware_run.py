@@ -42,6 +42,7 @@ from sim.hardware.identification import NAMES, IdentificationResult
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.world.linkage import Linkage
+from tests.experiments.refused_command import refused
 
 KNOWN = DeviceIdentity("arm", "usb", "", "", forces=True, watchdog=True, calibrated=True)
 
@@ -52,21 +53,14 @@ def found(**values: float) -> IdentificationResult:
     )
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(["hardware", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert captured.err.count("\n") == 1
-    return captured.err
-
-
 def test_run_without_terminal_or_arm_option_is_refused(tmp_path: Path, capsys) -> None:
-    assert "expected --arm" in refused(capsys, "run", "--out", str(tmp_path / "run"))
+    assert "expected --arm" in refused(["hardware", "run", "--out", str(tmp_path / "run")], capsys)
     assert not (tmp_path / "run").exists()
 
 
 def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monkeypatch) -> None:
     monkeypatch.setattr("experiments.hardware.run.check_present", lambda name: None)
-    stderr = refused(capsys, "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run"))
+    stderr = refused(["hardware", "run", "--device", "phantom", "--arm", "--out", str(tmp_path / "run")], capsys)
     assert "expected --certificate" in stderr
 
 
@@ -74,7 +68,9 @@ def test_device_with_motors_requires_a_certificate(tmp_path: Path, capsys, monke
     "limit", [("--force", "20"), ("--speed", "9"), ("--small", "5"), ("--silence", "6"), ("--ramp", "0.01")]
 )
 def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limit) -> None:
-    stderr = refused(capsys, "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run"))
+    stderr = refused(
+        ["hardware", "run", "--device", "phantom", "--arm", *limit, "--out", str(tmp_path / "run")], capsys
+    )
     assert limit[0] in stderr
     assert "on a real device" in stderr
     assert not (tmp_path / "run").exists()
@@ -90,19 +86,19 @@ def test_unsafe_limits_are_refused_on_a_real_device(tmp_path: Path, capsys, limi
      (("--delay", "5"), "without --certificate"), (("--emulate", "x.json", "--device", "hid"), "with --device hid")],
 )  # fmt: skip
 def test_options_without_effect_on_a_device_are_refused_by_name(tmp_path: Path, capsys, option, message) -> None:
-    stderr = refused(capsys, "run", "--arm", *option, "--out", str(tmp_path / "run"))
+    stderr = refused(["hardware", "run", "--arm", *option, "--out", str(tmp_path / "run")], capsys)
     assert f"{option[0]} {option[1]} has no meaning {message}" in stderr
     assert not (tmp_path / "run").exists()
 
 
 def test_excessive_silence_limit_is_refused(tmp_path: Path, capsys) -> None:
-    stderr = refused(capsys, "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run"))
+    stderr = refused(["hardware", "run", "--arm", "--silence", "2000000", "--out", str(tmp_path / "run")], capsys)
     assert "--silence is 2e+06; expected at most 5000 periods" in stderr
 
 
 @pytest.mark.parametrize("late", ["-1", "0", "nan", "inf", "1e6"])
 def test_meaningless_lateness_limit_is_refused_by_name(tmp_path: Path, capsys, late) -> None:
-    assert "--late is " in refused(capsys, "run", "--arm", "--late", late, "--out", str(tmp_path / "run"))
+    assert "--late is " in refused(["hardware", "run", "--arm", "--late", late, "--out", str(tmp_path / "run")], capsys)
 
 
 def test_simulated_hand_and_figure_of_a_file_are_named_as_ignored() -> None:
@@ -116,7 +112,7 @@ def test_simulated_hand_and_figure_of_a_file_are_named_as_ignored() -> None:
 
 def test_folder_with_a_run_is_kept_without_overwrite(tmp_path: Path, capsys) -> None:
     (tmp_path / "run.h5").write_bytes(b"")
-    assert "--overwrite" in refused(capsys, "run", "--arm", "--out", str(tmp_path))
+    assert "--overwrite" in refused(["hardware", "run", "--arm", "--out", str(tmp_path)], capsys)
 
 
 def test_certificate_of_other_inputs_does_not_arm(tmp_path: Path) -> None:
@@ -225,7 +221,7 @@ def test_calibration_finds_hidden_offset_and_keeps_file_content(tmp_path: Path, 
     assert margin.max() < 5e-4
     assert content["delay"]["value"] == [1e-4]
     assert content["calibration"]["name"] == "emulated Phantom"
-    assert "--overwrite" in refused(capsys, *arguments)
+    assert "--overwrite" in refused(["hardware", *arguments], capsys)
     capsys.readouterr()
     assert main(["hardware", *arguments, "--overwrite", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == read_device_file(file)
@@ -273,7 +269,7 @@ def test_invalid_emulated_device_is_refused_and_the_folder_unchanged(tmp_path: P
     if content is not None:
         file.write_text(content)
     assert message in refused(
-        capsys, "run", "--arm", "--emulate", str(file), "--out", str(old_file.parent), "--overwrite"
+        ["hardware", "run", "--arm", "--emulate", str(file), "--out", str(old_file.parent), "--overwrite"], capsys
     )
     assert list(old_file.parent.iterdir()) == [old_file]
 
@@ -291,9 +287,11 @@ def test_device_recording_is_certified_but_not_reproduced_or_drawn(tmp_path: Pat
 
 
 def test_identify_refuses_folders_without_a_hardware_run(tmp_path: Path, capsys) -> None:
-    assert "expected folders" in refused(capsys, "identify", "--out", str(tmp_path / "device.json"))
+    assert "expected folders" in refused(["hardware", "identify", "--out", str(tmp_path / "device.json")], capsys)
     (tmp_path / "device.json").write_text("{}")
-    assert "--overwrite" in refused(capsys, "identify", str(tmp_path), "--out", str(tmp_path / "device.json"))
+    assert "--overwrite" in refused(
+        ["hardware", "identify", str(tmp_path), "--out", str(tmp_path / "device.json")], capsys
+    )
 
 
 def test_state_diagram_in_docs_matches_transition_table() -> None:

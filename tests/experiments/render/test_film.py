@@ -1,11 +1,6 @@
 """Films: of every kind of run, written completely or not at all, with bodies drawn above the floor."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +23,7 @@ from sim.errors import SimError
 from sim.recording.recorder import Group, Recorder
 from sim.recording.recording import Recording
 from sim.world.world import World
+from tests.experiments.own_process import stderr_of_interrupted
 
 Colours = npt.NDArray[np.int64]
 
@@ -207,25 +203,12 @@ def test_interrupted_film_keeps_the_old_file(frames: int, tmp_path: Path, capfd:
     assert capfd.readouterr() == ("", "")  # no output of ffmpeg
 
 
-def _default_interrupt() -> None:
-    """Undo the ignored SIGINT that a child of a background shell inherits."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 @pytest.mark.slow
 def test_ctrl_c_on_render_leaves_no_file(tmp_path: Path, backend: str) -> None:
     pytest.importorskip("imageio_ffmpeg")
     run, film = write_run(tmp_path / "run", RunSpec()), tmp_path / "films" / "film.mp4"
-    command = [sys.executable, "-m", "experiments.cli", "render", str(run), "--out", str(film), "--fps", "200"]
-    process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_default_interrupt
-    )
-    deadline = time.monotonic() + 60.0
-    while not list(film.parent.glob(".*.mp4")) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    os.killpg(process.pid, signal.SIGINT)
-    stderr = process.communicate(timeout=30)[1]
-    assert process.returncode == 130, stderr
+    words = ["render", str(run), "--out", str(film), "--fps", "200"]
+    stderr = stderr_of_interrupted(words, lambda: bool(list(film.parent.glob(".*.mp4"))), wait=0.0)
     assert "Traceback" not in stderr
     assert not list(film.parent.iterdir())
 
