@@ -16,8 +16,7 @@ from numba import njit
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.arm_kinematics import arm_rates, bend_arm
-from controllers.haptic_map.base import STYLUS_TANGENT, KernelMap
-from controllers.haptic_map.map_stages import CompiledMap
+from controllers.haptic_map.base import STYLUS_TANGENT, HapticMap, KernelMap
 from controllers.saturation import saturate_vector
 from geometry.arrays import Array
 from geometry.rotations import angular_velocity, exponential, logarithm, rotation_vector_rate
@@ -141,16 +140,15 @@ class RobotArm(KernelMap):
         """Numbers of a tangent: seven."""
         return JOINTS
 
-    def check_domain(self, limits: Array, evaluate: Callable[[CompiledMap, Array], Array] | None = None) -> None:
+    def check_domain(self, limits: Array, evaluate: Callable[[HapticMap, Array], Array]) -> None:
         """Raise if the arm does not work at the centre or the edge of the domain, on a grid of directions and turns.
 
         Parameters
         ----------
         limits : Array, shape (7, 2)
             Least and greatest joint angles [rad].
-        evaluate : callable, optional
-            h of this map at stylus poses (n, 7), shape (n, 7), by code that is compiled already. By default the kernel
-            is called from Python and compiled for it.
+        evaluate : callable
+            Poses (n, 7) of a map at stylus poses (n, 7).
 
         Raises
         ------
@@ -163,8 +161,7 @@ class RobotArm(KernelMap):
         far, bounds = (_FAR_DISTANCE, _NEARLY_HALF_TURN), (self._params[_REACH + 1], self._params[_TURN + 1])
         edge = [(place, turn) for place in directions for turn in directions]
         points = np.array([np.concatenate([far[0] * u, exponential.py_func(*(far[1] * v))]) for u, v in edge])
-        poses = [self.pose(x) for x in points] if evaluate is None else evaluate(self.compiled(), points)
-        for (u, v), q in zip(edge, poses, strict=True):
+        for (u, v), q in zip(edge, evaluate(self, points), strict=True):
             straight = np.abs(q[[1, 3, 5]]).min() < _MIN_BEND
             if not np.isfinite(q).all() or straight or (q < limits[:, 0]).any() or (q > limits[:, 1]).any():
                 raise ParameterError(

@@ -20,7 +20,7 @@ from sim.hardware.gated_servo import ROW_SIZE, columns
 from sim.hardware.process_start import parent_id
 from sim.hardware.recorder_process import RECORDER_FORCE, RECORDER_SIZE
 from sim.hardware.shared import SharedNumbers
-from sim.reference.reference import poses_along
+from sim.reference.reference import reference_poses
 from sim.viewer.live_page import LivePage
 from sim.viewer.shown import Moment, courses
 from sim.world.shown_phantom import show_angles, shown_phantom
@@ -52,7 +52,8 @@ def show_status(config: RunConfig, status: SharedNumbers, recorder_status: Share
         if status.read(row):
             tick = {name: channel[0] for name, channel in columns(row[None]).items()}
             show_angles(linkage, tuple(tick["theta"]), tuple(tick["gimbal"]))
-            pose = np.zeros(0) if is_led else _animation_pose(session, np.concatenate([tick["p"], tick["quaternion"]]))
+            stylus = np.concatenate([tick["p"], tick["quaternion"]])[None]
+            pose = np.zeros(0) if is_led else reference_poses(session.servo.reference, stylus)[0]
             qpos = np.concatenate([world.data.qpos, pose])
             recorder_status.read(twin)
             hand = twin[RECORDER_FORCE : RECORDER_FORCE + 3].copy()
@@ -66,10 +67,3 @@ def notes_of(tick: Mapping[str, Array]) -> tuple[str, ...]:
     fault = Fault(int(tick["fault"]))
     state = State(int(tick["state"])).name.lower()
     return (f"{state}: {fault.words(float(tick['fault_value']))}" if fault else state, *link_now(tick).split(", "))
-
-
-def _animation_pose(session: Session, argument: Array) -> Array:
-    """Pose of the animation at a stylus pose (7,), shape (75,)."""
-    reference, poses = session.servo.reference, np.empty((1, session.haptic_map.nq))
-    poses_along(reference.stages, reference.params, reference.memory.copy(), argument[None], poses)
-    return poses[0]

@@ -42,8 +42,8 @@ from sim.reference.reference import (
     check_reference,
     derivatives_unit,
     map_derivatives,
-    poses_along,
     poses_unit,
+    reference_poses,
 )
 from sim.world.phantom_port import phantom_port
 from sim.world.plant import make_plant
@@ -211,8 +211,7 @@ def _set_start_state(parts: Parts, servo: Servo, world: World) -> None:
     else:
         stylus_pose = np.concatenate([start.point, UPRIGHT if orientation is None else orientation])
         argument = (stylus_pose if parts.walking is None else servo.argument)[None]
-        poses = np.empty((1, whole_map.nq))
-        poses_along(reference.stages, reference.params, reference.memory.copy(), argument, poses)
+        poses = reference_poses(reference, argument)
         if parts.bends and world.has_figure:
             lower_start(packed_legs(world.body), poses[0], parts.maps.size)
         figure_velocity = map_derivatives(whole_map, argument)[0, :, :3] @ start.velocity if moves else None

@@ -34,31 +34,23 @@ def _poses_along(stages: IntArray, params: Array, memory: Array, points: Array, 
         evaluate_map(stages, params, points[i], memory, poses[i])
 
 
-def poses_along(stages: IntArray, params: Array, memory: Array, points: Array, poses: Array) -> None:
-    """Evaluate a map along a path of the stylus.
-
-    Parameters
-    ----------
-    stages, params, memory
-        The map; its memory is updated.
-    points : Array
-        Positions in H and orientations wxyz, shape (n, 7).
-    poses : Array
-        Written, shape (n, 75).
-    """
-    _poses_along(linked_stages(stages), params, memory, points, poses)
-
-
 def map_poses(haptic_map: HapticMap, points: Array, memory: Array | None = None) -> Array:
     """Poses (n, nq) of a map along a path of the stylus (n, 7). `memory` is updated; default: that of a new run."""
     stages, params, fresh, _ = haptic_map.compiled()
     poses = np.empty((len(points), haptic_map.nq))
-    poses_along(stages, params, fresh if memory is None else memory, points, poses)
+    _poses_along(linked_stages(stages), params, fresh if memory is None else memory, points, poses)
+    return poses
+
+
+def reference_poses(reference: CompiledReference, arguments: Array) -> Array:
+    """Poses (n, nq) of a reference's map along a path of its arguments (n, 7); the reference is left as it is."""
+    poses = np.empty((len(arguments), len(reference.pose)))
+    _poses_along(linked_stages(reference.stages), reference.params, reference.memory.copy(), arguments, poses)
     return poses
 
 
 def poses_unit() -> Unit:
-    """The compilation unit of `poses_along`, without the map's kernels."""
+    """The compilation unit of `map_poses`, without the map's kernels."""
     return Unit.of(_poses_along, types.Array(types.int64, 2, "C"), VECTOR, VECTOR, _MATRIX, _MATRIX)
 
 

@@ -8,16 +8,14 @@ import numpy as np
 from controllers.curves.trajectory import Trajectory
 from controllers.errors import ParameterError
 from controllers.haptic_map.animation import ClipMap
-from controllers.haptic_map.map_stages import CompiledMap
 from controllers.haptic_map.robot_arm import RobotArm as RobotArmMap
 from experiments.setups.modes.rivers import default_choice
 from experiments.setups.parts.hands import river_pushes
 from experiments.setups.parts.pace import check_reach
 from experiments.setups.parts.part_types import ClipMapParts
-from geometry.arrays import Array
-from models.robot_arm.spec import ARM_JOINTS, arm_lengths, arm_limits
+from models.robot_arm.spec import arm_lengths, arm_limits
 from models.world.scene import PEDESTAL
-from sim.reference.reference import poses_along
+from sim.reference.reference import map_poses
 
 HOME = np.array([0.7, 0.0, 0.4])  # home position of the tool (end effector) in the frame of the arm's base [m]
 _TOOL_TILT = np.radians(75.0)  # tilt of the tool from the vertical
@@ -70,7 +68,7 @@ def arm_parts(arm: mujoco.MjModel, curve: Trajectory, reach: float, scale: float
     haptic_map = robot_arm_map(arm, scale)
 
     def refined() -> tuple[ClipMap, tuple[str, ...]]:
-        haptic_map.check_domain(arm_limits(arm), _evaluate)
+        haptic_map.check_domain(arm_limits(arm), map_poses)
         return cast(ClipMap, haptic_map), ()
 
     return ClipMapParts(
@@ -89,9 +87,3 @@ def tilted(circle: Trajectory) -> Trajectory:
     turned = np.stack([cosine * x - sine * z, y, sine * x + cosine * z], axis=1)
     turned[-1] = turned[0]
     return Trajectory(times, turned, periodic=True)
-
-
-def _evaluate(compiled: CompiledMap, points: Array) -> Array:
-    poses = np.empty((len(points), len(ARM_JOINTS)))
-    poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
-    return poses

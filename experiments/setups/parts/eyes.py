@@ -11,7 +11,7 @@ from geometry.arrays import Array
 from models.mocap.motion.clip import pose_difference
 from sim.devices.simulated import SimulatedPhantom
 from sim.loop.servo import Servo
-from sim.reference.reference import poses_along
+from sim.reference.reference import reference_poses
 from sim.users.person.eye import Eye
 from sim.users.person.wishes import ENGAGED, PLACE, Wishes
 
@@ -49,9 +49,7 @@ def learned_eye(servo: Servo, places: Array) -> Eye:
     reference = servo.reference
 
     def poses(points: Array) -> Array:
-        found = np.empty((len(points), len(reference.pose)))
-        poses_along(reference.stages, reference.params, reference.memory.copy(), stylus_path(points), found)
-        return found
+        return reference_poses(reference, stylus_path(points))
 
     effects = np.stack([
         pose_difference(poses(places - step), poses(places + step)) / (2.0 * _DIFFERENCE_STEP)

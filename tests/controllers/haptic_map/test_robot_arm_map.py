@@ -88,7 +88,9 @@ def test_compiled_map_is_identical():
 
 def test_unreachable_domain_raises_with_its_position():
     with pytest.raises(ParameterError, match=r"cannot follow a stylus at .* mm turned by"):
-        RobotArm(arm_lengths(MODEL), HOME, ORIENTATION, 6.0, (0.07, 0.1), (0.25, 0.45), 0.5).check_domain(LIMITS)
+        RobotArm(arm_lengths(MODEL), HOME, ORIENTATION, 6.0, (0.07, 0.1), (0.25, 0.45), 0.5).check_domain(
+            LIMITS, lambda arm, points: np.array([arm.pose(x) for x in points])
+        )
 
 
 @pytest.mark.parametrize(("reach", "scale"), [((0.1, 0.1), 1.0), ((0.07, 0.1), -1.0), ((0.07, np.nan), 1.0)])

@@ -28,7 +28,7 @@ from sim.compilation import kernel_units
 from sim.compilation.kernel_units import law_units, linked_stages
 from sim.compilation.unit_cache import cache_folder
 from sim.compilation.units import Unit
-from sim.reference.reference import map_derivatives, poses_along
+from sim.reference.reference import map_derivatives, map_poses
 
 ARM = default_arm_map(arm_model(), 1.5)
 FIELD = Follow(Trajectory.circle(0.05, 4.0), 300.0, 4.0, 0.02).program()
@@ -51,11 +51,8 @@ def test_unpickled_map_has_the_same_kernels():
 
 
 def test_map_called_by_address_equals_python_bit_for_bit():
-    compiled, rng = ARM.compiled(), np.random.default_rng(1)
-    points = stylus_path(rng.uniform(-0.05, 0.05, (20, 3)))
-    poses = np.empty((20, ARM.nq))
-    poses_along(compiled.stages, compiled.params, compiled.memory, points, poses)
-    np.testing.assert_array_equal(poses, [ARM.pose(x) for x in points])
+    points = stylus_path(np.random.default_rng(1).uniform(-0.05, 0.05, (20, 3)))
+    np.testing.assert_array_equal(map_poses(ARM, points), [ARM.pose(x) for x in points])
 
 
 def test_linked_unit_is_also_called_from_python():
