@@ -62,22 +62,39 @@ def fit_to_lap(loops: Sequence[Loop], lap: float | None = None, apart: bool = Fa
     apart : bool
         Whether each clip is fitted separately, travelling ones too.
     """
-    counts = [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
     if lap is None:
+        counts = _stride_counts(loops)
         wanted = next((count for count in counts if count > 1), 1)
-        shares = [wanted / count if count > 1 else 1.0 for count in counts]
+        shares: Sequence[float] = [wanted / count if count > 1 else 1.0 for count in counts]
     else:
-        travels = [not apart and float(np.hypot(*loop.drift[:2])) > MIN_TRAVEL for loop in loops]
-        durations = np.array([loop.duration / count for loop, count in zip(loops, counts, strict=True)])
-        common = _best_repeat_count(durations[travels], lap) if any(travels) else 1
-        shares = [
-            (common if goes else _best_repeat_count(np.array([duration]), lap)) / count
-            for duration, count, goes in zip(durations, counts, travels, strict=True)
-        ]
+        shares = _shares(loops, np.array([lap]), apart)[0].tolist()
     return [
         replace(loop, drift=share * loop.drift, duration=share * loop.duration, share=share)
         for loop, share in zip(loops, shares, strict=True)
     ]
+
+
+def played_durations(loops: Sequence[Loop], laps: Array, apart: bool = False) -> Array:
+    """Durations at their own pace [s] of what laps (n,) play of each loop, as in `fit_to_lap`, shape (n, loops)."""
+    return _shares(loops, laps, apart) * np.array([loop.duration for loop in loops])
+
+
+def _shares(loops: Sequence[Loop], laps: Array, apart: bool) -> Array:
+    """How often laps (n,) [s] play each loop, shape (n, loops)."""
+    counts = np.array(_stride_counts(loops))
+    durations = np.array([loop.duration for loop in loops]) / counts
+    travels = np.array([not apart and float(np.hypot(*loop.drift[:2])) > MIN_TRAVEL for loop in loops])
+    repeats = np.empty((len(laps), len(loops)))
+    for row, lap in zip(repeats, laps.tolist(), strict=True):
+        if travels.any():
+            row[travels] = _best_repeat_count(durations[travels], lap)
+        for i in np.flatnonzero(~travels):
+            row[i] = _best_repeat_count(durations[i : i + 1], lap)
+    return repeats / counts
+
+
+def _stride_counts(loops: Sequence[Loop]) -> list[int]:
+    return [strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1 for loop in loops]
 
 
 def _best_repeat_count(durations: Array, lap: float) -> int:
@@ -103,13 +120,13 @@ def natural_lap(loops: Sequence[Loop], apart: bool = False) -> float:
     """
     longest = min(max(_MAX_LAP_DURATION, *(loop.duration for loop in loops)), _MAX_STEADY_LAP)
     laps = whole_strides(loops[0], longest)
-    worst = np.array([max(abs(np.log(one.duration / lap)) for one in fit_to_lap(loops, lap, apart)) for lap in laps])
+    worst = np.abs(np.log(played_durations(loops, laps, apart) / laps[:, None])).max(axis=1)
     return float(laps[np.flatnonzero(worst < worst.min() + 0.02)[0]])
 
 
 def whole_strides(loop: Loop, longest: float) -> Array:
     """Durations of whole numbers of strides of a loop from 3 s to `longest`, or of the fewest that last 3 s [s]."""
-    stride = loop.duration / (strides(loop) if np.hypot(*loop.drift[:2]) > 0.0 else 1)
+    stride = loop.duration / _stride_counts([loop])[0]
     fewest = int(np.ceil(_MIN_LAP_DURATION / stride - _REPEAT_TOLERANCE))
     most = max(fewest, int(longest / stride + _REPEAT_TOLERANCE))
     return np.arange(fewest, most + 1, dtype=np.float64) * stride

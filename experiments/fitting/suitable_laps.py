@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from controllers.motion.loops import Loop, checked_clip, closed_loop
-from controllers.motion.strides import fit_to_lap, natural_lap, whole_strides
+from controllers.motion.strides import fit_to_lap, natural_lap, played_durations, whole_strides
 from experiments.fitting.blendable import longest_flight
+from geometry.arrays import Array
 from models.mocap.motion.clip import Clip
 
 MIN_PACE, MAX_PACE = 0.75, 1.33  # played pace over the clip's own: inertial forces scale with its square, 0.56 to 1.8
@@ -42,31 +43,29 @@ def pace_mismatch(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) 
 
     It is the largest of log pace / log limit, with the limit of slower or of faster playing.
     """
-    return _mismatch([_pace_limits(clip) for clip in clips], loops, seconds)
+    paces = np.array([[loop.duration / seconds for loop in loops]])
+    return float(_mismatches(clips, paces)[0])
 
 
-def _pace_limits(clip: Clip) -> tuple[float, float]:
-    return _FLYING_PACES_ALONE if longest_flight(clip) > 0.0 else _PACES_ALONE
+def _mismatches(clips: Sequence[Clip], paces: Array) -> Array:
+    """`pace_mismatch` at paces (n, clips)."""
+    limits = [_FLYING_PACES_ALONE if longest_flight(clip) > 0.0 else _PACES_ALONE for clip in clips]
+    slowest, fastest = np.array(limits).T
+    return np.max(np.log(paces) / np.log(np.where(paces > 1.0, fastest, slowest)), axis=1)
 
 
-def _mismatch(limits: Sequence[tuple[float, float]], loops: Sequence[Loop], seconds: float) -> float:
-    paces = [float(loop.duration / seconds) for loop in loops]
-    return max(np.log(pace) / np.log(of[int(pace > 1.0)]) for pace, of in zip(paces, limits, strict=True))
-
-
-def fit_round(clips: Sequence[Clip], rounds: Sequence[float]) -> tuple[float, bool]:
-    """The shortest of rounds [s], in order, that suits clips that are played by themselves, or else the best.
+def fit_round(clips: Sequence[Clip], rounds: Array) -> tuple[float, bool]:
+    """The shortest of rounds (n,) [s], in order, that suits clips that are played by themselves, or else the best.
 
     With it, whether strides of the clips are out of step in it.
     """
-    loops, limits = closed_loops(clips), [_pace_limits(clip) for clip in clips]
-    tried = [
-        (_mismatch(limits, fit_to_lap(loops, seconds, apart), seconds), seconds, apart)
-        for seconds in rounds
-        for apart in (False, True)
-    ]
-    enough = max(1.0, 1.1 * min(mismatch for mismatch, *_ in tried))
-    return next((seconds, apart) for mismatch, seconds, apart in tried if mismatch <= enough)
+    loops = closed_loops(clips)
+    tried = np.stack(
+        [_mismatches(clips, played_durations(loops, rounds, apart) / rounds[:, None]) for apart in (False, True)],
+        axis=1,
+    )
+    i, apart = divmod(int(np.flatnonzero(tried.ravel() <= max(1.0, 1.1 * tried.min()))[0]), 2)
+    return float(rounds[i]), bool(apart)
 
 
 def closed_loops(clips: Sequence[Clip]) -> list[Loop]:
@@ -83,7 +82,7 @@ def best_lap(clips: Sequence[Clip], timing: int | None) -> float:
     loops = closed_loops(clips)
     if timing is None:
         rounds = np.sort(np.concatenate([whole_strides(loop, MAX_LAPS * _MAX_ROUND_LAP) for loop in loops]))
-        seconds, _ = fit_round(clips, rounds.tolist())
+        seconds, _ = fit_round(clips, rounds)
         return round(seconds / min(np.ceil(seconds / _MAX_ROUND_LAP), MAX_LAPS), 6)
     loops = [loops[timing], *loops[:timing], *loops[timing + 1 :]]
     lap = natural_lap(loops)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import mujoco
+import numpy as np
 
 from controllers.errors import ParameterError
 from controllers.haptic_map.river_clips import RiverClips as RiverClipsMap
@@ -39,7 +40,7 @@ def river_clips_setup(
     played, place = played_clips(clips, _RIVER_COUNT, part.kind), place_of(part)
     curves = [river.curve for river in river_bundle(place.curve, part.reach, 1.0, 1.0, mode.river_tube).rivers]
     lap = place.curve.duration
-    seconds, apart = fit_round(played, [laps * lap for laps in range(1, 2 if all_same(played) else MAX_LAPS + 1)])
+    seconds, apart = fit_round(played, lap * np.arange(1.0, 2 if all_same(played) else MAX_LAPS + 1))
     laps = round(seconds / lap)
     haptic_map = RiverClipsMap(
         curves, motions_of(played), mode.river_tube, figure_legs(figure), seconds, apart, laps

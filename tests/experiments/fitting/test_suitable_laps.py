@@ -111,18 +111,25 @@ def test_round_keeps_the_pace_of_a_long_clip_that_is_not_the_first() -> None:
     """At a whole number of the first clip's 10.1 s the second would be a tenth too fast, as a pirouette that fell."""
     angry, cheer = lasting("angry", 5.05), lasting("cheer", 11.15)
     lap = best_lap((angry, cheer, angry), None)
-    seconds, _ = fit_round((angry, cheer, angry), [laps * lap for laps in range(1, 5)])
+    seconds, _ = fit_round((angry, cheer, angry), lap * np.arange(1.0, 5.0))
     paces = [loop.duration / seconds for loop in fit_to_lap(closed_loops((angry, cheer)), seconds)]
     assert min(paces) >= 0.75
     assert max(paces) <= 1.05
 
 
-def test_round_is_the_shortest_that_suits_all_or_the_best() -> None:
-    clips = lasting("angry", 4.0), lasting("cheer", 4.0)
-    assert fit_round(clips, (4.0, 8.0)) == (4.0, False)
-    assert fit_round((clips[0], lasting("cheer", 6.0)), (4.0, 8.0, 12.0)) == (8.0, False)
-    assert fit_round((clips[0], lasting("cheer", 6.0)), (4.0, 12.0)) == (12.0, False)
-    assert fit_round(clips, (1.0, 2.0)) == (2.0, False)
+@pytest.mark.parametrize(
+    ("seconds", "rounds", "chosen"),
+    [
+        (4.0, (4.0, 8.0), 4.0),
+        (6.0, (4.0, 8.0, 12.0), 8.0),  # at 0.75 of its pace
+        (6.0, (4.0, 12.0), 12.0),
+        (4.0, (1.0, 2.0), 2.0),
+    ],
+)
+def test_round_is_the_shortest_that_suits_all_or_the_best(
+    seconds: float, rounds: tuple[float, ...], chosen: float
+) -> None:
+    assert fit_round((lasting("angry", 4.0), lasting("cheer", seconds)), np.array(rounds)) == (chosen, False)
 
 
 def test_round_of_a_clip_that_lasts_longer_than_its_laps_may_keeps_its_pace() -> None:
