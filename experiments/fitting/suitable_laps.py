@@ -16,6 +16,7 @@ MIN_FLYING_PACE, MAX_FLYING_PACE = 0.9, 1.1  # the same for clips with flights, 
 # flights with 9 % of weight at most at these paces, and at 1.2 with 5 to 18; five with flights of 0.1 s at most with 6
 # to 11 at 0.95 and 11 to 27 at 1.05; jumps at neither.
 _PACES_ALONE, _FLYING_PACES_ALONE = (0.75, 1.05), (0.97, 1.02)
+_ROUNDING = 1e-9  # by which a pace at its limit may be beyond it
 MAX_LAPS = 4  # laps in a round: with more, a hand waits long for a transition, and there are many to compute
 _MAX_ROUND_LAP = 6.0  # [s] of a lap in a round: in slower rivers a push hardly moves a hand to another one
 _LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natural_lap` takes the shortest of them
@@ -39,19 +40,19 @@ def lap_suits_blend(clips: Sequence[Clip], loops: Sequence[Loop], lap: float) ->
 
 
 def pace_mismatch(clips: Sequence[Clip], loops: Sequence[Loop], seconds: float) -> float:
-    """How far from their own paces a time [s] plays loops, each by itself: up to 1 they are followed at these paces.
+    """How far beyond limits of their paces a time [s] plays loops, each by itself; 0 if each is within its limits.
 
-    It is the largest of log pace / log limit, with the limit of slower or of faster playing.
+    It is the sum over the loops of max(log pace / log limit - 1, 0), with the limit of slower or of faster playing.
     """
-    paces = np.array([[loop.duration / seconds for loop in loops]])
-    return float(_mismatches(clips, paces)[0])
+    return float(_mismatches(clips, np.array([[loop.duration / seconds for loop in loops]]))[0])
 
 
 def _mismatches(clips: Sequence[Clip], paces: Array) -> Array:
     """`pace_mismatch` at paces (n, clips)."""
     limits = [_FLYING_PACES_ALONE if longest_flight(clip) > 0.0 else _PACES_ALONE for clip in clips]
     slowest, fastest = np.array(limits).T
-    return np.max(np.log(paces) / np.log(np.where(paces > 1.0, fastest, slowest)), axis=1)
+    ratios = np.log(paces) / np.log(np.where(paces > 1.0, fastest, slowest))
+    return np.maximum(ratios - 1.0 - _ROUNDING, 0.0).sum(axis=1)
 
 
 def fit_round(clips: Sequence[Clip], rounds: Array) -> tuple[float, bool]:
@@ -64,7 +65,7 @@ def fit_round(clips: Sequence[Clip], rounds: Array) -> tuple[float, bool]:
         [_mismatches(clips, played_durations(loops, rounds, apart) / rounds[:, None]) for apart in (False, True)],
         axis=1,
     )
-    i, apart = divmod(int(np.flatnonzero(tried.ravel() <= max(1.0, 1.1 * tried.min()))[0]), 2)
+    i, apart = divmod(int(np.flatnonzero(tried.ravel() <= 1.1 * tried.min())[0]), 2)
     return float(rounds[i]), bool(apart)
 
 

@@ -54,7 +54,7 @@ def cylindrical_parts(clips: tuple[Clip, ...], figure: mujoco.MjModel, place: Pl
         if all_same(clips):
             balanced_map = with_balance(haptic_map, figure, lap)
             # An open clip is played forth and back. Backwards it needs the same forces, but is followed less well.
-            keeps_pace = pace_mismatch(clips[:1], haptic_map.loops[:1], lap) <= 1.0
+            keeps_pace = pace_mismatch(clips[:1], haptic_map.loops[:1], lap) == 0.0
             as_prepared = clips[0].closes(CLOSURE_TOLERANCE) and keeps_pace
             return balanced_map, () if as_prepared else single_clip_remarks(balanced_map, clips[0].name, lap, parallel)
         return (with_balance(haptic_map, figure, lap), ()) if moves_alike(haptic_map, lap) else choose_legs()

@@ -39,7 +39,7 @@ def lap(config: RunConfig) -> float:
 def test_default_lap_plays_a_file_at_its_own_pace(kind: str, slow_jump: str) -> None:
     config = run_config(map=kind, clips=(slow_jump,), seconds=1.0)
     parts = map_parts(resolved(config), figure_model())
-    assert pace_mismatch(parts.clips, parts.haptic_map.loops[:1], lap(config)) <= 1.0
+    assert pace_mismatch(parts.clips, parts.haptic_map.loops[:1], lap(config)) == 0.0
     assert not any("times its recorded speed" in remark for remark in parts.remarks)
 
 
@@ -49,7 +49,7 @@ def test_default_lap_of_rivers_is_one_of_a_round(slow_jump: str) -> None:
     assert lap(config) == pytest.approx(3.6)
     parts = map_parts(resolved(config), figure_model())
     assert parts.haptic_map.laps == 2
-    assert pace_mismatch((parts.clips * 2)[:3], parts.haptic_map.loops, 7.2) <= 1.0
+    assert pace_mismatch((parts.clips * 2)[:3], parts.haptic_map.loops, 7.2) == 0.0
 
 
 def test_given_lap_and_laps_of_embedded_clips_stay(slow_jump: str) -> None:
