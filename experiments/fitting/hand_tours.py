@@ -166,13 +166,14 @@ def river_remarks(
     figure : mujoco.MjModel
         Model of the figure alone.
     """
-    rivers = {name: river for river, name in enumerate(names)}
-    lines = [line for name, river in rivers.items() for line in _remark_on_river(haptic_map, river, name)]
+    # Different clips may have one name, and one clip may have several rivers.
+    alone = [line for river, name in enumerate(names) for line in _remark_on_river(haptic_map, river, name)]
+    lines = tuple(dict.fromkeys(alone))
     made_of = (haptic_map.compiled().params, np.array([part.smoothing, part.blend]))
     trial = AnimationTrial(__name__, lambda: tour_of_rivers(haptic_map, part, figure), _RIVERS_DURATION, made_of)
     result = trial.followed()
     if result.stands:
-        return tuple(lines)
+        return lines
     where = ""
     if result.fell is not None:
         stop = min(int(result.fell // _DWELL_TIME), len(_ORDER) - 1)

@@ -25,8 +25,8 @@ _LAP_TOLERANCE = 0.02  # laps of less relative difference count as equal: `natur
 def timing_clip(clips: Sequence[Clip]) -> int:
     """Index of the clip that times the lap: the first without a flight, or else the first.
 
-    Which clip's legs are combined with the arms of the others is found with the physical figure (`carried`): arms move
-    the centre of mass, so flights of a clip are ballistic only with its own arms.
+    Which clip's legs are combined with the arms of the others is found with the physical figure (`leg_choice`): arms
+    move the centre of mass, so flights of a clip are ballistic only with its own arms.
     """
     return next((i for i, clip in enumerate(clips) if longest_flight(clip) == 0.0), 0)
 
